@@ -1,0 +1,41 @@
+# Every target creates its own environment; python3 (3.10 or newer) and the package registry are all it needs.
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+INSTALLED := $(VENV)/.installed
+
+.PHONY: help test lint test-slow reproduce constraints clean
+
+help:
+	@echo "make reproduce   the two experiments of the paper: tables and figures in results/"
+	@echo "make test        lint, types, import rules and the default test suite"
+	@echo "make test-slow   campaigns that take minutes"
+	@echo "make constraints pin the versions that the tests cover"
+	@echo "make clean       remove the environment and everything that was made"
+
+$(INSTALLED): pyproject.toml constraints.txt
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check uv
+	$(BIN)/uv pip install --quiet --python $(BIN)/python --constraints constraints.txt --editable '.[all,test]'
+	@touch $@
+
+lint: $(INSTALLED)
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/basedpyright
+	$(BIN)/lint-imports --no-cache
+
+test: lint
+	$(BIN)/python -m pytest -n 2
+
+test-slow: $(INSTALLED)
+	$(BIN)/python -m pytest -m slow
+
+reproduce: $(INSTALLED)
+	$(BIN)/opspace reproduce all --out results
+
+constraints: $(INSTALLED)
+	$(BIN)/uv pip compile --quiet --universal --upgrade --python-version 3.10 --all-extras --no-header --no-annotate --no-emit-index-url --output-file constraints.txt pyproject.toml
+
+clean:
+	rm -rf $(VENV) results dist build .pytest_cache .ruff_cache .hypothesis

@@ -1,0 +1,1 @@
+"""Operational space control with continuous task transitions."""

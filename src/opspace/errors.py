@@ -1,0 +1,91 @@
+"""Errors raised by opspace, each naming what is wrong and what would be right."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+from pathlib import Path
+
+
+class OpspaceError(Exception):
+    """Base of every error that opspace raises on purpose."""
+
+
+class InputError(OpspaceError, ValueError):
+    """A number, shape or value that cannot be used."""
+
+
+class UnknownNameError(OpspaceError):
+    """A name that does not exist; the message lists near matches and the valid choices."""
+
+
+class ModelError(OpspaceError):
+    """A robot file that cannot be read or used."""
+
+
+class RecordingError(OpspaceError):
+    """A recording that cannot be written or read."""
+
+
+class MissingExtraError(OpspaceError, ImportError):
+    """An optional dependency that is not installed."""
+
+
+class ScenarioError(OpspaceError):
+    """A scenario that cannot be used.
+
+    Attributes:
+        file: Scenario file, or None for a scenario that was not read from a file.
+        line: Line of the offending key, counted from 1, or None where it is not known.
+        key: Dotted path of the offending key, for example ``tasks.position.kp``.
+    """
+
+    def __init__(
+        self,
+        message: str,
+        *,
+        file: Path | str | None = None,
+        line: int | None = None,
+        key: str = "",
+    ) -> None:
+        where = str(file) if file is not None else "scenario"
+        if line is not None:
+            where += f":{line}"
+        super().__init__(f"{where}: {key + ': ' if key else ''}{message}")
+        self.file = file
+        self.line = line
+        self.key = key
+
+
+def unknown_name(kind: str, name: str, choices: Iterable[str]) -> UnknownNameError:
+    """Build the error for a name that is not among ``choices``.
+
+    Args:
+        kind: What the name should have been, for example ``"frame"``.
+        name: The name as given.
+        choices: Every valid name.
+
+    Returns:
+        The error, to be raised by the caller.
+    """
+    valid = list(choices)
+    near = difflib.get_close_matches(name, valid, n=3, cutoff=0.5)
+    hint = f"; did you mean {' or '.join(repr(n) for n in near)}?" if near else ""
+    return UnknownNameError(
+        f"unknown {kind} {name!r}{hint} (valid: {', '.join(valid) if valid else 'none'})"
+    )
+
+
+def missing_extra(package: str, extra: str) -> MissingExtraError:
+    """Build the error for an optional dependency that is not installed.
+
+    Args:
+        package: Name of the package that failed to import.
+        extra: The extra of opspace that installs it.
+
+    Returns:
+        The error, to be raised by the caller.
+    """
+    return MissingExtraError(
+        f"{package} is not installed; install it with: pip install 'opspace[{extra}]'"
+    )

@@ -1,0 +1,272 @@
+"""Activations in [0, 1]: smooth profiles, buffers on a quantity and ramps in time."""
+
+# J, M and R are the paper's matrices, not constants; jaxtyping leaves NumPy's type parameters open.
+# pyright: strict, reportConstantRedefinition=false, reportUnknownMemberType=false
+# pyright: reportUnknownVariableType=false, reportUnknownArgumentType=false
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import NamedTuple
+
+from opspace.errors import InputError, unknown_name
+
+
+class Activation(NamedTuple):
+    """An activation and its first two derivatives with respect to its argument."""
+
+    value: float
+    slope: float
+    curvature: float
+
+
+_INSTANT = 1e-9
+_OFF = Activation(0.0, 0.0, 0.0)
+_ON = Activation(1.0, 0.0, 0.0)
+
+
+def _linear(s: float) -> Activation:
+    return Activation(s, 1.0, 0.0)
+
+
+def _cubic(s: float) -> Activation:
+    return Activation(s * s * (3.0 - 2.0 * s), 6.0 * s * (1.0 - s), 6.0 - 12.0 * s)
+
+
+def _quintic(s: float) -> Activation:
+    return Activation(
+        s**3 * (10.0 + s * (6.0 * s - 15.0)),
+        30.0 * s * s * (1.0 - s) ** 2,
+        60.0 * s * (1.0 - s) * (1.0 - 2.0 * s),
+    )
+
+
+def _half_sine(s: float) -> Activation:
+    angle = math.pi * s
+    return Activation(
+        0.5 - 0.5 * math.cos(angle),
+        0.5 * math.pi * math.sin(angle),
+        0.5 * math.pi**2 * math.cos(angle),
+    )
+
+
+def _tanh(s: float) -> Activation:
+    argument = 1.0 / (1.0 - s) - 1.0 / s
+    # Beyond this the value equals 0 or 1 to the last bit and cosh would overflow.
+    if abs(argument) > 300.0:
+        return _ON if argument > 0.0 else _OFF
+    slope = 1.0 / (1.0 - s) ** 2 + 1.0 / s**2
+    curvature = 2.0 / (1.0 - s) ** 3 - 2.0 / s**3
+    tangent = math.tanh(argument)
+    sech2 = 1.0 / math.cosh(argument) ** 2
+    return Activation(
+        0.5 * (1.0 + tangent),
+        0.5 * sech2 * slope,
+        0.5 * sech2 * (curvature - 2.0 * tangent * slope**2),
+    )
+
+
+_SHAPES: Mapping[str, Callable[[float], Activation]] = MappingProxyType(
+    {
+        "linear": _linear,
+        "cubic": _cubic,
+        "quintic": _quintic,
+        "half-sine": _half_sine,
+        "tanh": _tanh,
+    }
+)
+
+PROFILES = tuple(_SHAPES)
+"""Names of the profiles, from the least to the most often differentiable (half-sine is C¹)."""
+
+
+@dataclass(frozen=True)
+class Profile:
+    r"""A smooth step from 0 at s = 0 to 1 at s = 1, constant outside.
+
+    ========== =============================================== ==========
+    name       h(s)                                            smoothness
+    ========== =============================================== ==========
+    linear     s                                               C⁰
+    cubic      3 s² − 2 s³                                     C¹
+    quintic    10 s³ − 15 s⁴ + 6 s⁵                            C²
+    half-sine  ½ − ½ cos(π s)                                  C¹
+    tanh       ½ (1 + tanh(1/(1 − s) − 1/s))                   C^∞
+    ========== =============================================== ==========
+
+    The torque is as smooth in time as its activations, so quintic is the default everywhere.
+
+    Args:
+        name: One of the names above.
+
+    Raises:
+        UnknownNameError: The name is not one of them.
+    """
+
+    name: str = "quintic"
+
+    def __post_init__(self) -> None:
+        if self.name not in _SHAPES:
+            raise unknown_name("activation profile", self.name, PROFILES)
+
+    def __call__(self, s: float) -> Activation:
+        """Evaluate h, dh/ds and d²h/ds² at ``s`` (any real number)."""
+        if s <= 0.0:
+            return _OFF
+        if s >= 1.0:
+            return _ON
+        h = _SHAPES[self.name](s)
+        # Rounding of a polynomial next to its end must not leave [0, 1].
+        return Activation(min(max(h.value, 0.0), 1.0), h.slope, h.curvature)
+
+
+@dataclass(frozen=True)
+class Buffer:
+    """Activation by a quantity: 0 at ``off``, 1 at ``on``, smooth in between (Fig. 4 of the paper).
+
+    h(x) = profile((x − off) / (on − off)). With ``off < on`` the activation rises with x (a singular
+    value that must be large), with ``off > on`` it falls (a distance that must not become small).
+
+    Args:
+        off: Value of the quantity at and beyond which the activation is 0, in its own unit.
+        on: Value at and beyond which the activation is 1.
+        profile: Name of the profile, see `Profile`.
+
+    Raises:
+        InputError: The two edges coincide or are not finite.
+        UnknownNameError: There is no such profile.
+    """
+
+    off: float
+    on: float
+    profile: str = "quintic"
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.off) and math.isfinite(self.on)) or self.off == self.on:
+            raise InputError(
+                f"a buffer needs two different finite edges, got off={self.off}, on={self.on}"
+            )
+        Profile(self.profile)
+
+    def __call__(self, x: float) -> Activation:
+        """Evaluate h, dh/dx and d²h/dx² at ``x``."""
+        width = self.on - self.off
+        h = Profile(self.profile)((x - self.off) / width)
+        return Activation(h.value, h.slope / width, h.curvature / width**2)
+
+
+@dataclass(frozen=True)
+class Ramp:
+    """Activation by time, which can be sent elsewhere at any moment without a step.
+
+    h(t) = profile(s(t)). An undisturbed ramp has s(t) = (t − start_time) / duration. When a running
+    ramp gets a new target, the rate of s is led smoothly (C¹) from the old one to the constant rate
+    that arrives on time, so h keeps its value, slope and curvature. s may pass 0 or 1 on the way;
+    h is constant there, hence it never leaves [0, 1].
+
+    Build the first one with `Ramp.resting` and every other one with `towards`.
+    """
+
+    target: float
+    start_time: float
+    duration: float
+    profile: str
+    phase: float
+    rate: float
+    acceleration: float
+    blend_time: float
+    cruise: float
+
+    @staticmethod
+    def resting(value: float, profile: str = "quintic") -> "Ramp":
+        """Build a ramp that stays at ``value``, 0 or 1.
+
+        Args:
+            value: 0.0 (out) or 1.0 (in).
+            profile: Name of the profile, see `Profile`.
+
+        Raises:
+            InputError: ``value`` is neither 0 nor 1.
+            UnknownNameError: There is no such profile.
+        """
+        _check_target(value)
+        Profile(profile)
+        return Ramp(value, 0.0, 0.0, profile, value, 0.0, 0.0, 0.0, 0.0)
+
+    def towards(self, target: float, duration: float, t: float) -> "Ramp":
+        """Build the ramp that leaves the present activation at ``t`` and arrives ``duration`` later.
+
+        Args:
+            target: 0.0 or 1.0.
+            duration: Time to get there, s; less than a nanosecond is a hard switch.
+            t: Time of the request, s.
+
+        Returns:
+            The new ramp, equal to this one in value, slope and curvature at ``t``.
+
+        Raises:
+            InputError: Target, duration or time cannot be used.
+        """
+        _check_target(target)
+        if not (math.isfinite(duration) and duration >= 0.0):
+            raise InputError(f"the duration of a ramp must be finite and >= 0 s, got {duration}")
+        if not math.isfinite(t):
+            raise InputError(f"the time of a ramp must be finite, got {t}")
+        if duration < _INSTANT:
+            return Ramp(target, t, 0.0, self.profile, target, 0.0, 0.0, 0.0, 0.0)
+        s, rate, acceleration = self._phase(t)
+        if not 0.0 < s < 1.0:
+            # h is flat here, so the phase may start at the edge with whatever rate it needs.
+            edge = min(max(s, 0.0), 1.0)
+            cruise = (target - edge) / duration
+            return Ramp(target, t, duration, self.profile, edge, cruise, 0.0, 0.0, cruise)
+        # Long enough to be gentle, short enough that s overshoots by at most about 1/8.
+        blend = 0.5 * duration
+        if rate != 0.0:
+            blend = min(blend, 0.25 / abs(rate))
+        if acceleration != 0.0:
+            blend = min(blend, 1.0 / math.sqrt(abs(acceleration)))
+        covered = blend * rate / 2.0 + blend**2 * acceleration / 12.0
+        cruise = (target - s - covered) / (duration - 0.5 * blend)
+        return Ramp(target, t, duration, self.profile, s, rate, acceleration, blend, cruise)
+
+    def __call__(self, t: float) -> Activation:
+        """Evaluate h, dh/dt [1/s] and d²h/dt² [1/s²] at time ``t`` [s]."""
+        s, rate, acceleration = self._phase(t)
+        h = Profile(self.profile)(s)
+        return Activation(h.value, h.slope * rate, h.curvature * rate**2 + h.slope * acceleration)
+
+    def finished(self, t: float) -> bool:
+        """Tell whether the ramp has arrived at its target at time ``t`` [s]."""
+        return t >= self.start_time + self.duration
+
+    def _phase(self, t: float) -> tuple[float, float, float]:
+        tau = max(t - self.start_time, 0.0)
+        if tau >= self.duration:
+            return self.target, 0.0, 0.0
+        if tau >= self.blend_time:
+            covered = self.blend_time * (
+                (self.rate + self.cruise) / 2.0 + self.blend_time * self.acceleration / 12.0
+            )
+            return self.phase + covered + self.cruise * (tau - self.blend_time), self.cruise, 0.0
+        # The rate is a cubic Hermite segment from (rate, acceleration) to (cruise, 0).
+        width, x = self.blend_time, tau / self.blend_time
+        s = self.phase + width * (
+            self.rate * (x**4 / 2 - x**3 + x)
+            + self.acceleration * width * (x**4 / 4 - 2 * x**3 / 3 + x**2 / 2)
+            + self.cruise * (x**3 - x**4 / 2)
+        )
+        rate = (
+            self.rate * (2 * x**3 - 3 * x**2 + 1)
+            + self.acceleration * width * (x**3 - 2 * x**2 + x)
+            + self.cruise * (3 * x**2 - 2 * x**3)
+        )
+        acceleration = (self.cruise - self.rate) * (
+            6 * x - 6 * x**2
+        ) / width + self.acceleration * (3 * x**2 - 4 * x + 1)
+        return s, rate, acceleration
+
+
+def _check_target(value: float) -> None:
+    if value not in (0.0, 1.0):
+        raise InputError(f"a ramp goes to activation 0 or 1, got {value}")

@@ -1,0 +1,71 @@
+"""Which stacks a partly active stack is a mixture of, and with what weights."""
+
+# J, M and R are the paper's matrices, not constants; jaxtyping leaves NumPy's type parameters open.
+# pyright: strict, reportConstantRedefinition=false, reportUnknownMemberType=false
+# pyright: reportUnknownVariableType=false, reportUnknownArgumentType=false
+from collections.abc import Sequence
+from itertools import combinations
+from typing import NamedTuple
+
+import numpy as np
+
+from opspace.errors import unknown_name
+
+
+class Weighted(NamedTuple):
+    """One corner of a blend: the task sets that are present in it, and its weight."""
+
+    weight: float
+    present: frozenset[int]
+
+
+BLENDINGS = ("idv", "chain")
+"""``idv``: intermediate desired values, 2^k corners. ``chain``: k + 1 corners."""
+
+
+def corners(activations: Sequence[float], blending: str) -> list[Weighted]:
+    """List the hard stacks that a blend is made of.
+
+    Task sets with activation 0 are in none, those with activation 1 in all; only the k in between
+    branch. The weights are not negative, sum to 1, and those of the corners that contain task set k
+    sum to h_k.
+
+    Args:
+        activations: h_k of every task set.
+        blending: ``"idv"`` or ``"chain"``.
+
+    Returns:
+        The corners with weight > 0.
+
+    Raises:
+        UnknownNameError: There is no such blending.
+    """
+    if blending not in BLENDINGS:
+        raise unknown_name("blending", blending, BLENDINGS)
+    always = frozenset(k for k, h in enumerate(activations) if h == 1.0)
+    moving = [k for k, h in enumerate(activations) if 0.0 < h < 1.0]
+    if blending == "idv":
+        return _idv_corners(activations, always, moving)
+    return _chain_corners(activations, always, moving)
+
+
+def _idv_corners(h: Sequence[float], always: frozenset[int], moving: list[int]) -> list[Weighted]:
+    """Multilinear interpolation: Π_{k∈T} h_k Π_{k∉T} (1 − h_k) for every subset T."""
+    result: list[Weighted] = []
+    for size in range(len(moving) + 1):
+        for chosen in combinations(moving, size):
+            weight = float(np.prod([h[k] if k in chosen else 1.0 - h[k] for k in moving]))
+            if weight > 0.0:
+                result.append(Weighted(weight, always | frozenset(chosen)))
+    return result
+
+
+def _chain_corners(h: Sequence[float], always: frozenset[int], moving: list[int]) -> list[Weighted]:
+    """Lovász extension: h_(i) − h_(i+1) for the i most active task sets, i = 0 … k."""
+    order = sorted(moving, key=lambda k: -h[k])
+    steps = [1.0, *(h[k] for k in order), 0.0]
+    return [
+        Weighted(steps[i] - steps[i + 1], always | frozenset(order[:i]))
+        for i in range(len(order) + 1)
+        if steps[i] > steps[i + 1]
+    ]

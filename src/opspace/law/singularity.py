@@ -1,0 +1,160 @@
+"""Singular directions: each eigenvector of a level's projected inverse inertia fades on its own.
+
+The projected inverse inertia of a level, JN JNᵀ = U Σ Uᵀ (Eq. 25), is split by its eigenvectors. A
+direction whose eigenvalue σ falls through a buffer leaves the level smoothly, and its joint motion goes
+back to the levels below. The split must be made here, in whitened coordinates: singular vectors of J
+itself couple the two parts through the inertia and step at the edge of the buffer.
+"""
+
+# J, M and R are the paper's matrices, not constants; jaxtyping leaves NumPy's type parameters open.
+# pyright: strict, reportConstantRedefinition=false, reportUnknownMemberType=false
+# pyright: reportUnknownVariableType=false, reportUnknownArgumentType=false
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from jaxtyping import Float
+
+from opspace.errors import InputError
+from opspace.law.activation import Buffer
+from opspace.law.hierarchy import Partial
+
+
+@dataclass(frozen=True)
+class SigmaBuffer:
+    """Buffer on the eigenvalues σ of Λ⁻¹ = J_p A⁻¹ Nᵀ J_pᵀ, Eq. 25 and Fig. 4 of the paper.
+
+    A direction is fully active for σ >= upper, absent for σ <= lower. Eigenvalues are those of the
+    rows as the task sets scale them: with ``TaskSet.sigma_reference`` left at 1 they are in 1/kg and
+    1/(kg·m²) and the buffer is absolute, as in the paper (0.01 to 0.02); with a reference given they
+    are dimensionless multiples of it and the buffer is relative.
+
+    Args:
+        lower: σ at and below which a direction is absent; must be > 0.
+        upper: σ at and above which a direction is fully active.
+        profile: Name of the activation profile.
+
+    Raises:
+        InputError: Not 0 < lower < upper.
+        UnknownNameError: There is no such profile.
+    """
+
+    lower: float
+    upper: float
+    profile: str = "quintic"
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.lower < self.upper < float("inf"):
+            raise InputError(
+                f"a sigma buffer needs 0 < lower < upper, got lower={self.lower}, upper={self.upper}"
+            )
+        Buffer(self.lower, self.upper, self.profile)
+
+    def activation(self, sigma: float) -> float:
+        """Activation h(σ) of a direction, 0 below the buffer and 1 above."""
+        return Buffer(self.lower, self.upper, self.profile)(sigma).value
+
+
+@dataclass(frozen=True)
+class Spectrum:
+    """The directions of one level, strongest first.
+
+    Attributes:
+        sigma: Eigenvalues of the projected inverse inertia, shape (k,), k = min(rows, free motions);
+            empty where the certificate made the eigen-decomposition unnecessary.
+        activation: Activation of each direction, shape (k,).
+        directions: Eigenvectors as columns, in the level's stacked rows, shape (m, k).
+    """
+
+    sigma: Float[np.ndarray, " k"]
+    activation: Float[np.ndarray, " k"]
+    directions: Float[np.ndarray, "m k"]
+
+
+class Alternative(NamedTuple):
+    """One way in which a level may act, and its weight in the blend."""
+
+    weight: float
+    partial: Partial
+
+
+class LevelOutcome(NamedTuple):
+    """Every alternative of a level and the spectrum behind them."""
+
+    alternatives: list[Alternative]
+    spectrum: Spectrum | None
+
+
+def solve_level_smoothly(
+    J: Float[np.ndarray, "m n"],
+    f: Float[np.ndarray, " m"],
+    above: Partial,
+    buffer: SigmaBuffer,
+    *,
+    want_spectrum: bool = False,
+) -> LevelOutcome:
+    """Add one level whose weak directions fade out (Section 4.1 of the paper).
+
+    Direction i contributes V_i (u_iᵀ r)/√σ_i with r = f_l − Ĵ_l û_{l−1}. The level's alternatives are
+    its i strongest directions, i = 0 … k, with weights h(σ_i) − h(σ_{i+1}): the chain rule. It is
+    continuous where two eigenvalues cross and their eigenvectors are arbitrary, because the set
+    that would separate them then has weight 0.
+
+    Args:
+        J: Whitened Jacobian of the level, shape (m, n).
+        f: Desired value of the level, shape (m,).
+        above: Result of the levels above.
+        buffer: Where directions fade.
+        want_spectrum: Compute the spectrum even where the certificate makes it unnecessary.
+
+    Returns:
+        Alternatives with weight > 0 and the spectrum (None when it was skipped).
+    """
+    JN = J @ above.Z
+    residual = f - J @ above.u
+    if not want_spectrum:
+        certified = _certified_regular(JN, residual, above, buffer)
+        if certified is not None:
+            return LevelOutcome([Alternative(1.0, certified)], None)
+    U, s, Vt = np.linalg.svd(JN)
+    sigma = s**2
+    activation = np.array([buffer.activation(x) for x in sigma.tolist()])
+    k = s.size
+    strength = np.zeros(k)
+    strength[activation > 0.0] = (U[:, :k].T @ residual)[activation > 0.0] / s[activation > 0.0]
+    steps = [1.0, *activation.tolist(), 0.0]
+    alternatives = [
+        Alternative(
+            steps[i] - steps[i + 1],
+            Partial(above.u + above.Z @ (Vt[:i].T @ strength[:i]), above.Z @ Vt[i:].T),
+        )
+        for i in range(k + 1)
+        if steps[i] > steps[i + 1]
+    ]
+    return LevelOutcome(alternatives, Spectrum(sigma, activation, U[:, :k]))
+
+
+def _certified_regular(
+    JN: Float[np.ndarray, "m r"],
+    residual: Float[np.ndarray, " m"],
+    above: Partial,
+    buffer: SigmaBuffer,
+) -> Partial | None:
+    """Solve the level without its spectrum if a bound proves that no direction is in the buffer.
+
+    1/trace(Λ) <= σ_min, and with JNᵀ = Q R the trace of Λ = (JN JNᵀ)⁻¹ is ‖R⁻¹‖²_F.
+
+    Returns:
+        The level's result, or None where the bound proves nothing.
+    """
+    m, r = JN.shape
+    if m == 0 or m > r:
+        return None
+    Q, R = np.linalg.qr(JN.T, mode="complete")
+    # A zero on the diagonal is an exactly singular level, whose bound is 0.
+    if np.min(np.abs(np.diag(R))) ** 2 < buffer.upper:
+        return None
+    R_inverse = np.linalg.inv(R[:m])
+    if 1.0 / np.sum(R_inverse**2) < buffer.upper:
+        return None
+    return Partial(above.u + above.Z @ (Q[:, :m] @ (R_inverse.T @ residual)), above.Z @ Q[:, m:])

@@ -1,0 +1,125 @@
+"""The whole law as one walk down the levels that branches only where something is half active."""
+
+# J, M and R are the paper's matrices, not constants; jaxtyping leaves NumPy's type parameters open.
+# pyright: strict, reportConstantRedefinition=false, reportUnknownMemberType=false
+# pyright: reportUnknownVariableType=false, reportUnknownArgumentType=false
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from jaxtyping import Float
+
+from opspace.law.blending import Weighted
+from opspace.law.hierarchy import Level, Partial, WhitenedTask, solve_level, stack_rows, start
+from opspace.law.singularity import (
+    Alternative,
+    LevelOutcome,
+    SigmaBuffer,
+    Spectrum,
+    solve_level_smoothly,
+)
+
+
+@dataclass(frozen=True)
+class LevelReport:
+    """What happened at one level on the heaviest branch of the walk.
+
+    Attributes:
+        priority: Priority of the level.
+        members: Indices of the task sets present, in the order of their rows.
+        weight: Weight of the branch that this report describes.
+        spectrum: Directions of the level, or None where they were not computed.
+    """
+
+    priority: int
+    members: tuple[int, ...]
+    weight: float
+    spectrum: Spectrum | None
+
+
+@dataclass
+class WalkReport:
+    """The cost of one evaluation and what it found.
+
+    Attributes:
+        hard_solves: Corners of the blend: stacks whose hard torque entered the sum.
+        level_solves: Levels that were actually solved; corners share the levels above their first
+            difference.
+        levels: One report per level that was reached.
+    """
+
+    hard_solves: int = 0
+    level_solves: int = 0
+    levels: dict[int, LevelReport] = field(default_factory=dict[int, LevelReport])
+
+
+class Walk:
+    """Sum of weight · H(T; f) over the corners T of a blend, sharing the levels that corners share.
+
+    Args:
+        whitened: Every task set.
+        levels: Every level, most important first.
+        buffer: Buffer on σ for the singular directions, or None for the plain law.
+        compensate: False for Eq. 15-16 to the letter.
+        want_spectra: Compute every level's spectrum for the report, needed or not.
+    """
+
+    def __init__(
+        self,
+        whitened: Sequence[WhitenedTask],
+        levels: Sequence[Level],
+        *,
+        buffer: SigmaBuffer | None = None,
+        compensate: bool = True,
+        want_spectra: bool = False,
+    ) -> None:
+        self._whitened = whitened
+        self._levels = levels
+        self._buffer = buffer
+        self._compensate = compensate
+        self._want_spectra = want_spectra
+        self.report = WalkReport()
+
+    def torque(self, blend: Sequence[Weighted], n: int) -> Float[np.ndarray, " n"]:
+        """Whitened torque û(h) of the blend, shape (n,)."""
+        self.report = WalkReport(hard_solves=len(blend))
+        return self._descend(0, start(n), 1.0, blend)
+
+    def _descend(
+        self, depth: int, above: Partial, weight: float, blend: Sequence[Weighted]
+    ) -> Float[np.ndarray, " n"]:
+        if depth == len(self._levels) or not above.Z.shape[1]:
+            return sum(corner.weight for corner in blend) * above.u
+        level = self._levels[depth]
+        groups: dict[frozenset[int], list[Weighted]] = {}
+        for corner in blend:
+            groups.setdefault(corner.present & level.members, []).append(corner)
+        total = np.zeros_like(above.u)
+        for members, corners in groups.items():
+            share = weight * sum(corner.weight for corner in corners)
+            for alternative in self._solve(level, members, above, share):
+                total += alternative.weight * self._descend(
+                    depth + 1, alternative.partial, weight * alternative.weight, corners
+                )
+        return total
+
+    def _solve(
+        self, level: Level, members: frozenset[int], above: Partial, share: float
+    ) -> list[Alternative]:
+        if not members:
+            return [Alternative(1.0, above)]
+        self.report.level_solves += 1
+        J, f = stack_rows(self._whitened, members)
+        if self._buffer is None:
+            partial = solve_level(J, f, above, compensate=self._compensate)
+            outcome = LevelOutcome([Alternative(1.0, partial)], None)
+        else:
+            outcome = solve_level_smoothly(
+                J, f, above, self._buffer, want_spectrum=self._want_spectra
+            )
+        known = self.report.levels.get(level.priority)
+        if known is None or share > known.weight:
+            self.report.levels[level.priority] = LevelReport(
+                level.priority, tuple(sorted(members)), share, outcome.spectrum
+            )
+        return outcome.alternatives

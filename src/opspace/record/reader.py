@@ -1,0 +1,187 @@
+"""Reads a recording back, whole or cut short."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+
+from opspace.errors import InputError, RecordingError, unknown_name
+from opspace.record import format as fmt
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Recording:
+    """The numbers of a run, by column name.
+
+    Attributes:
+        directory: Where it was read from.
+        columns: The columns in their order on disk.
+        header: Everything in ``header.json``: ``scenario``, ``seed``, ``versions``, ...
+        meta: When and where it was recorded.
+        ended: How the run ended.
+        data: (T, number of columns) read-only.
+    """
+
+    directory: Path
+    columns: tuple[fmt.Column, ...]
+    header: Mapping[str, Any]
+    meta: Mapping[str, Any]
+    ended: fmt.End
+    data: np.ndarray
+    _index: Mapping[str, int] = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        index = {column.name: i for i, column in enumerate(self.columns)}
+        object.__setattr__(self, "_index", index)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The column names in their order on disk."""
+        return tuple(self._index)
+
+    @property
+    def units(self) -> Mapping[str, str]:
+        """The unit of each column."""
+        return {column.name: column.unit for column in self.columns}
+
+    @property
+    def t(self) -> np.ndarray:
+        """(T,) time [s]: the column ``t``."""
+        return self["t"]
+
+    def __len__(self) -> int:
+        return len(self.data)
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._index
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        """Look up one column.
+
+        Args:
+            name: Column name, for example ``q/joint1``.
+
+        Returns:
+            (T,) read-only view.
+
+        Raises:
+            UnknownNameError: There is no such column.
+        """
+        try:
+            return self.data[:, self._index[name]]
+        except KeyError:
+            raise unknown_name(f"column of {self.directory}", name, self.names) from None
+
+    def members(self, prefix: str) -> tuple[str, ...]:
+        """List the columns of a group.
+
+        Args:
+            prefix: Group name, for example ``q`` or ``tasks/position/error``.
+
+        Returns:
+            The names that start with ``prefix/``, in their order on disk.
+
+        Raises:
+            UnknownNameError: No column lies in such a group.
+        """
+        found = tuple(name for name in self._index if name.startswith(prefix + "/"))
+        if not found:
+            raise unknown_name(f"column group of {self.directory}", prefix, self._groups())
+        return found
+
+    def group(self, prefix: str) -> np.ndarray:
+        """Gather the columns of a group.
+
+        Args:
+            prefix: Group name, for example ``q`` or ``tasks/position/error``.
+
+        Returns:
+            (T, k) in the order of ``members(prefix)``.
+
+        Raises:
+            UnknownNameError: No column lies in such a group.
+        """
+        return self.data[:, [self._index[name] for name in self.members(prefix)]]
+
+    def _groups(self) -> list[str]:
+        groups: dict[str, None] = {}
+        for name in self._index:
+            parts = name.split("/")
+            groups.update(("/".join(parts[:i]), None) for i in range(1, len(parts)))
+        return list(groups)
+
+
+def load(directory: Path | str) -> Recording:
+    """Read a recording.
+
+    A recording without ``end.json`` was cut short: the row that was being written is dropped.
+
+    Args:
+        directory: The recording's directory.
+
+    Returns:
+        The recording.
+
+    Raises:
+        RecordingError: A file is missing, corrupt or of another format.
+    """
+    directory = Path(directory)
+    header = fmt.read_json(directory / fmt.HEADER)
+    columns = _columns(directory / fmt.HEADER, header)
+    data = _read_data(directory / fmt.DATA, len(columns))
+    ended = _read_end(directory / fmt.END, len(data))
+    meta = fmt.read_json(directory / fmt.META) if (directory / fmt.META).exists() else {}
+    return Recording(
+        directory=directory,
+        columns=columns,
+        header=MappingProxyType(header),
+        meta=MappingProxyType(meta),
+        ended=ended,
+        data=data,
+    )
+
+
+def _columns(path: Path, header: Mapping[str, Any]) -> tuple[fmt.Column, ...]:
+    if header.get("format") != fmt.FORMAT:
+        raise RecordingError(f"{path} is not the header of a recording")
+    version = header.get("format_version")
+    if version != fmt.FORMAT_VERSION:
+        raise RecordingError(
+            f"{path} has format version {version!r}; this opspace reads {fmt.FORMAT_VERSION}"
+        )
+    try:
+        columns = tuple(fmt.Column(**column) for column in header["columns"])
+        fmt.check_columns(columns)
+    except (KeyError, TypeError, AttributeError, InputError) as error:
+        raise RecordingError(f"{path} does not list its columns properly: {error}") from error
+    return columns
+
+
+def _read_data(path: Path, width: int) -> np.ndarray:
+    try:
+        content = path.read_bytes()
+    except OSError as error:
+        raise RecordingError(f"{path} cannot be read: {error.strerror}") from error
+    rows = len(content) // (width * np.dtype(fmt.DTYPE).itemsize)
+    # Made from bytes, the array is read-only.
+    return np.frombuffer(content, dtype=fmt.DTYPE, count=rows * width).reshape(rows, width)
+
+
+def _read_end(path: Path, rows: int) -> fmt.End:
+    if not path.exists():
+        return fmt.End("unfinished", "the process was killed or is still running", rows)
+    content = fmt.read_json(path)
+    try:
+        end = fmt.End(content["ended"], content["reason"], content["rows"])
+    except (KeyError, InputError) as error:
+        raise RecordingError(f"{path} does not say how the run ended: {error}") from error
+    if end.rows != rows:
+        raise RecordingError(
+            f"{path.with_name(fmt.DATA)} holds {rows} rows where {path.name} says {end.rows}"
+        )
+    return end

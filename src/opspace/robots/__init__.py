@@ -1,0 +1,6 @@
+"""Robots behind one protocol, on Pinocchio or MuJoCo."""
+
+from opspace.robots.protocol import Robot as Robot
+from opspace.robots.registry import RobotInfo as RobotInfo
+from opspace.robots.registry import available_robots as available_robots
+from opspace.robots.registry import load_robot as load_robot

@@ -1,0 +1,57 @@
+"""What a robot file says besides dynamics: names, limits and postures."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+WORLD = "world"
+BASE_JOINT = "floating_base"
+
+
+@dataclass(frozen=True)
+class Description:
+    """Names, limits and postures of a robot, independent of the library that computes it.
+
+    The fields are those of ``opspace.robots.protocol.Robot``.
+
+    Attributes:
+        quaternions: Index in q of the first coordinate (w) of every quaternion.
+    """
+
+    name: str
+    source: Path | None
+    nq: int
+    nv: int
+    joint_names: tuple[str, ...]
+    frame_names: tuple[str, ...]
+    tool: str
+    q_reference: np.ndarray
+    q_lower: np.ndarray
+    q_upper: np.ndarray
+    velocity_limit: np.ndarray
+    torque_limit: np.ndarray
+    actuated: np.ndarray
+    quaternions: tuple[int, ...] = ()
+    floating_base: bool = False
+    locked_joints: tuple[str, ...] = ()
+    configurations: Mapping[str, np.ndarray] = field(default_factory=dict)
+
+
+def mid_range(lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
+    """Return the middle of each range, zero where a side is unlimited.
+
+    Args:
+        lower: (n,) lower limits.
+        upper: (n,) upper limits.
+
+    Returns:
+        (n,) middle values.
+    """
+    limited = np.isfinite(lower) & np.isfinite(upper)
+    middle = np.zeros(len(lower))
+    middle[limited] = 0.5 * (lower[limited] + upper[limited])
+    return middle

@@ -1,0 +1,94 @@
+"""Turn a robot file into a robot on one dynamics library."""
+
+# Each backend is imported where it is chosen.
+# ruff: noqa: PLC0415
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection
+from dataclasses import dataclass
+from pathlib import Path
+
+from opspace.errors import ModelError
+from opspace.robots.description import Description
+from opspace.robots.protocol import Robot
+from opspace.robots.urdf import describe_urdf, read_urdf
+
+SUFFIXES = (".urdf", ".xml")
+
+
+@dataclass(frozen=True)
+class RobotFile:
+    """A robot file that has been read.
+
+    Attributes:
+        description: What it says besides dynamics; may be replaced before ``build`` is called.
+        build: Makes the robot from a description.
+    """
+
+    description: Description
+    build: Callable[[Description], Robot]
+
+
+def read_robot(
+    path: Path, backend: str, floating_base: bool, locked_joints: Collection[str] = ()
+) -> RobotFile:
+    """Read a URDF or MJCF file for one dynamics library.
+
+    Args:
+        path: The file; .urdf or .xml.
+        backend: "pinocchio" or "mujoco".
+        floating_base: Whether to free the root link.
+        locked_joints: URDF joints to hold fixed at zero.
+
+    Returns:
+        The file, ready to be built.
+
+    Raises:
+        ModelError: The file does not exist, cannot be used, or has nothing that moves.
+    """
+    if not path.is_file():
+        raise ModelError(f"{path}: no such file")
+    if path.suffix not in SUFFIXES:
+        raise ModelError(f"{path}: a robot file ends in {' or '.join(SUFFIXES)}")
+    read = _read_urdf if path.suffix == ".urdf" else _read_mjcf
+    robot = read(path, backend, floating_base, locked_joints)
+    if robot.description.nv == 0:
+        raise ModelError(f"{path}: the robot has no joint that moves")
+    return robot
+
+
+def _read_urdf(
+    path: Path, backend: str, floating_base: bool, locked_joints: Collection[str]
+) -> RobotFile:
+    urdf = read_urdf(path, locked_joints, floating_base)
+    description = describe_urdf(urdf, floating_base)
+    if backend == "pinocchio":
+        from opspace.robots.pinocchio import PinocchioRobot
+        from opspace.robots.pinocchio_model import model_from_urdf
+
+        pinocchio_model = model_from_urdf(urdf, floating_base)
+        return RobotFile(description, lambda d: PinocchioRobot(d, pinocchio_model))
+    from opspace.robots.mujoco import MujocoRobot
+    from opspace.robots.mujoco_model import compile_spec, urdf_spec
+
+    mujoco_model = compile_spec(urdf_spec(urdf, floating_base), path)
+    return RobotFile(description, lambda d: MujocoRobot(d, mujoco_model))
+
+
+def _read_mjcf(
+    path: Path, backend: str, floating_base: bool, locked_joints: Collection[str]
+) -> RobotFile:
+    from opspace.robots.mujoco_model import compile_spec, describe_mujoco, mjcf_spec
+
+    compiled = compile_spec(mjcf_spec(path, floating_base, locked_joints), path)
+    description = describe_mujoco(compiled, path)
+    if backend == "pinocchio":
+        from opspace.robots.pinocchio import PinocchioRobot
+        from opspace.robots.pinocchio_model import model_from_mujoco
+
+        model = model_from_mujoco(compiled)
+        return RobotFile(description, lambda d: PinocchioRobot(d, model))
+    from opspace.robots.mujoco import MujocoRobot
+
+    return RobotFile(description, lambda d: MujocoRobot(d, compiled))

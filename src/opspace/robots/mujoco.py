@@ -1,0 +1,127 @@
+"""The robot protocol on MuJoCo."""
+
+# The compiled module mujoco has no type stubs.
+# pyright: reportAttributeAccessIssue=false
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+
+from opspace.robots.base import AdapterBase
+from opspace.robots.description import Description
+
+
+class MujocoRobot(AdapterBase):
+    """A robot whose dynamics MuJoCo computes."""
+
+    def __init__(self, description: Description, model: mujoco.MjModel) -> None:
+        """Wrap a model.
+
+        Args:
+            description: Names, limits and postures, in the model's order.
+            model: The compiled model; it is never changed.
+        """
+        super().__init__(description)
+        self._model = model
+        self._data = mujoco.MjData(model)
+        self._sites = [_site(model, name) for name in self.frame_names]
+        self._bodies = [
+            model.body(name).id if site < 0 else int(model.site_bodyid[site])
+            for name, site in zip(self.frame_names, self._sites, strict=True)
+        ]
+        moving = model.body_weldid > 0
+        self._massive = np.flatnonzero(moving & (model.body_mass > 0.0)).tolist()
+        self._mass = model.body_mass * moving
+        self._total_mass = float(self._mass.sum())
+        self._M = np.zeros((self.nv, self.nv))
+        self._bias = np.zeros(self.nv)
+        self._M_view, self._bias_view = self._M.view(), self._bias.view()
+        self._M_view.setflags(write=False)
+        self._bias_view.setflags(write=False)
+        self.update(self.q_reference, np.zeros(self.nv))
+
+    @property
+    def M(self) -> np.ndarray:
+        """Return the joint-space inertia, (nv, nv), armature included."""
+        return self._M_view
+
+    @property
+    def bias(self) -> np.ndarray:
+        """Return b + g, (nv,) N·m. Friction is not part of it."""
+        return self._bias_view
+
+    def integrate(self, q: np.ndarray, v: np.ndarray, dt: float) -> np.ndarray:
+        """Return q ⊕ v dt on the configuration manifold, (nq,)."""
+        moved = np.array(q, dtype=float)
+        mujoco.mj_integratePos(self._model, moved, np.asarray(v, dtype=float), dt)
+        return moved
+
+    def difference(self, q0: np.ndarray, q1: np.ndarray) -> np.ndarray:
+        """Return v, (nv,), such that integrate(q0, v, 1) is q1."""
+        v = np.zeros(self.nv)
+        mujoco.mj_differentiatePos(
+            self._model, v, 1.0, np.asarray(q0, dtype=float), np.asarray(q1, dtype=float)
+        )
+        return v
+
+    def _compute(self) -> None:
+        model, data = self._model, self._data
+        data.qpos[:] = self._q
+        data.qvel[:] = self._v
+        mujoco.mj_kinematics(model, data)
+        mujoco.mj_comPos(model, data)
+        mujoco.mj_crb(model, data)
+        mujoco.mj_fullM(model, data, self._M)
+        mujoco.mj_comVel(model, data)
+        mujoco.mj_rne(model, data, 0, self._bias)
+
+    def _gravity(self, _: int) -> np.ndarray:
+        # g(q) = -sum_i m_i J_i^T g, which is the whole mass at the centre of mass.
+        return -self._total_mass * (self.com_jacobian().T @ self._model.opt.gravity)
+
+    def _position(self, frame: int) -> np.ndarray:
+        site = self._sites[frame]
+        data = self._data
+        return np.array(data.xpos[self._bodies[frame]] if site < 0 else data.site_xpos[site])
+
+    def _rotation(self, frame: int) -> np.ndarray:
+        site = self._sites[frame]
+        data = self._data
+        matrix = data.xmat[self._bodies[frame]] if site < 0 else data.site_xmat[site]
+        return matrix.reshape(3, 3).copy()
+
+    def _jacobian(self, frame: int) -> np.ndarray:
+        J = np.zeros((6, self.nv))
+        point = self.position(frame)
+        mujoco.mj_jac(self._model, self._data, J[:3], J[3:], point, self._bodies[frame])
+        return J
+
+    def _drift(self, frame: int) -> np.ndarray:
+        Jdot = np.zeros((6, self.nv))
+        point = self.position(frame)
+        mujoco.mj_jacDot(self._model, self._data, Jdot[:3], Jdot[3:], point, self._bodies[frame])
+        return Jdot @ self._v
+
+    def _com(self, _: int) -> np.ndarray:
+        return self._mass @ self._data.xipos / self._total_mass
+
+    def _com_jacobian(self, _: int) -> np.ndarray:
+        # MuJoCo counts the links that are fixed to the world; they do not move.
+        J = np.zeros((3, self.nv))
+        mujoco.mj_jacSubtreeCom(self._model, self._data, J, 0)
+        return J * (self._model.body_subtreemass[0] / self._total_mass)
+
+    def _com_drift(self, _: int) -> np.ndarray:
+        Jdot, total = np.zeros((3, self.nv)), np.zeros((3, self.nv))
+        for body in self._massive:
+            point = self._data.xipos[body]
+            mujoco.mj_jacDot(self._model, self._data, Jdot, None, point, body)
+            total += self._mass[body] * Jdot
+        return total @ self._v / self._total_mass
+
+
+def _site(model: mujoco.MjModel, name: str) -> int:
+    """Return the id of the site of this name, or -1 where a body has it."""
+    is_body = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, name) >= 0
+    return -1 if is_body else mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SITE, name)

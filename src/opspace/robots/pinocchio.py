@@ -1,0 +1,120 @@
+"""The robot protocol on Pinocchio."""
+
+# The compiled module pinocchio has no type stubs.
+# pyright: reportAttributeAccessIssue=false
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from opspace.robots.base import AdapterBase
+from opspace.robots.description import Description
+from opspace.robots.pinocchio_model import frame_ids
+
+ALIGNED = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+
+
+class PinocchioRobot(AdapterBase):
+    """A robot whose dynamics Pinocchio computes."""
+
+    def __init__(self, description: Description, model: Any) -> None:
+        """Wrap a model.
+
+        Args:
+            description: Names, limits and postures, in the model's order.
+            model: The ``pinocchio.Model``; it is never changed.
+        """
+        super().__init__(description)
+        self._model = model
+        self._data = model.createData()
+        # Gravity and centre of mass overwrite intermediate results that the frames still need.
+        self._scratch = model.createData()
+        self._frames = frame_ids(model, description)
+        self._zero = np.zeros(self.nv)
+        self._to_pin = _quaternion_order(self.nq, description.quaternions, (1, 2, 3, 0))
+        self._from_pin = _quaternion_order(self.nq, description.quaternions, (3, 0, 1, 2))
+        # M is symmetric; the transpose of Eigen's column-major array is C-contiguous.
+        self._M = self._data.M.T
+        self._M.setflags(write=False)
+        self._bias = self._data.nle
+        self._bias.setflags(write=False)
+        self.update(self.q_reference, self._zero)
+
+    @property
+    def M(self) -> np.ndarray:
+        """Return the joint-space inertia, (nv, nv), armature included."""
+        return self._M
+
+    @property
+    def bias(self) -> np.ndarray:
+        """Return b + g, (nv,) N·m. Friction is not part of it."""
+        return self._bias
+
+    def integrate(self, q: np.ndarray, v: np.ndarray, dt: float) -> np.ndarray:
+        """Return q ⊕ v dt on the configuration manifold, (nq,)."""
+        moved = pin.integrate(self._model, self._order(q), np.asarray(v, dtype=float) * dt)
+        return moved[self._from_pin] if self._from_pin is not None else moved
+
+    def difference(self, q0: np.ndarray, q1: np.ndarray) -> np.ndarray:
+        """Return v, (nv,), such that integrate(q0, v, 1) is q1."""
+        return pin.difference(self._model, self._order(q0), self._order(q1))
+
+    def _order(self, q: np.ndarray) -> np.ndarray:
+        q = np.asarray(q, dtype=float)
+        return q[self._to_pin] if self._to_pin is not None else q
+
+    def _compute(self) -> None:
+        model, data, q = self._model, self._data, self._order(self._q)
+        self._q_pin = q
+        # At zero acceleration a frame's acceleration is its drift Jdot v.
+        pin.forwardKinematics(model, data, q, self._v, self._zero)
+        # The world convention leaves the joint Jacobians in the data, which the frames read.
+        pin.crba(model, data, q, pin.Convention.WORLD)
+        pin.nonLinearEffects(model, data, q, self._v)
+
+    def _gravity(self, _: int) -> np.ndarray:
+        return np.array(pin.computeGeneralizedGravity(self._model, self._scratch, self._q_pin))
+
+    def _position(self, frame: int) -> np.ndarray:
+        placement = pin.updateFramePlacement(self._model, self._data, self._frames[frame])
+        return np.array(placement.translation)
+
+    def _rotation(self, frame: int) -> np.ndarray:
+        placement = pin.updateFramePlacement(self._model, self._data, self._frames[frame])
+        return np.array(placement.rotation, order="C")
+
+    def _jacobian(self, frame: int) -> np.ndarray:
+        J = pin.getFrameJacobian(self._model, self._data, self._frames[frame], ALIGNED)
+        return np.ascontiguousarray(J)
+
+    def _drift(self, frame: int) -> np.ndarray:
+        motion = pin.getFrameClassicalAcceleration(
+            self._model, self._data, self._frames[frame], ALIGNED
+        )
+        return np.array(motion.vector)
+
+    def _com(self, _: int) -> np.ndarray:
+        return np.array(pin.centerOfMass(self._model, self._scratch, self._q_pin))
+
+    def _com_jacobian(self, _: int) -> np.ndarray:
+        J = pin.jacobianCenterOfMass(self._model, self._scratch, self._q_pin)
+        return np.array(J, order="C")
+
+    def _com_drift(self, _: int) -> np.ndarray:
+        pin.centerOfMass(self._model, self._scratch, self._q_pin, self._v, self._zero)
+        return np.array(self._scratch.acom[0])
+
+
+def _quaternion_order(
+    nq: int, quaternions: tuple[int, ...], order: tuple[int, int, int, int]
+) -> np.ndarray | None:
+    """Return the index that reorders every quaternion of q, or None where there is none."""
+    if not quaternions:
+        return None
+    index = np.arange(nq)
+    for start in quaternions:
+        index[start : start + 4] = start + np.array(order)
+    return index

@@ -1,0 +1,242 @@
+"""Read a URDF file once, so that both dynamics libraries are given the same robot."""
+
+from __future__ import annotations
+
+import math
+import xml.etree.ElementTree as ET
+from collections.abc import Collection
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from opspace.errors import ModelError, unknown_name
+from opspace.robots.description import BASE_JOINT, WORLD, Description, mid_range
+
+VECTORS = {"xyz", "rpy"}
+MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+NUMBERS = VECTORS | {*MOMENTS, "value", "lower", "upper", "effort", "velocity"}
+MOVING = ("revolute", "continuous", "prismatic")
+
+
+@dataclass(frozen=True)
+class UrdfJoint:
+    """One joint of the tree; limits are infinite where the file gives none."""
+
+    name: str
+    kind: str
+    parent: str
+    child: str
+    lower: float
+    upper: float
+    velocity: float
+    effort: float
+    axis: tuple[float, ...]
+    element: ET.Element
+
+    @property
+    def moving(self) -> bool:
+        """Whether the joint has a degree of freedom."""
+        return self.kind in MOVING
+
+
+@dataclass(frozen=True)
+class Urdf:
+    """A URDF reduced to its kinematics and inertias, joints in depth-first order."""
+
+    name: str
+    path: Path
+    root: str
+    links: dict[str, ET.Element | None]
+    joints: tuple[UrdfJoint, ...]
+    locked: tuple[str, ...]
+
+    @property
+    def moving_joints(self) -> tuple[UrdfJoint, ...]:
+        """The joints with a degree of freedom, in the order of q."""
+        return tuple(j for j in self.joints if j.moving)
+
+
+def read_urdf(path: Path, locked: Collection[str] = (), floating_base: bool = False) -> Urdf:
+    """Read a URDF file; shapes, transmissions and mimic relations are left out.
+
+    Args:
+        path: The file.
+        locked: Joints to hold fixed at zero.
+        floating_base: Whether the root link is to move freely.
+
+    Returns:
+        The robot's tree.
+
+    Raises:
+        ModelError: The file does not exist, is no URDF, is not one tree, or its root cannot float.
+        UnknownNameError: A locked joint is not in the file.
+    """
+    root = _parse(path)
+    _check_numbers(root, path)
+    links = {_name(link, path): link.find("inertial") for link in root.findall("link")}
+    elements = [joint for joint in root.findall("joint") if joint.get("type") is not None]
+    names = [_name(joint, path) for joint in elements]
+    for repeated in (n for n in names if names.count(n) > 1):
+        raise ModelError(f"{path}: joint {repeated!r} occurs twice")
+    for name in locked:
+        if name not in names:
+            raise unknown_name(f"joint of {path.name}", name, names)
+    joints = {_name(e, path): _joint(e, locked, links, path) for e in elements}
+    base, ordered = _depth_first(joints, links, path)
+    if floating_base and base == WORLD:
+        raise ModelError(f"{path}: the root link {WORLD!r} cannot float")
+    return Urdf(root.get("name") or path.stem, path, base, links, ordered, tuple(locked))
+
+
+def describe_urdf(urdf: Urdf, floating_base: bool) -> Description:
+    """Collect names, limits and a mid-range posture.
+
+    Args:
+        urdf: The robot's tree.
+        floating_base: Whether the root link moves freely.
+
+    Returns:
+        The description.
+    """
+    moving = urdf.moving_joints
+    base_v, base_q = (6, 7) if floating_base else (0, 0)
+    free = np.full(base_v, math.inf)
+    lower = np.concatenate([-free, [j.lower for j in moving]])
+    upper = np.concatenate([free, [j.upper for j in moving]])
+    q = np.zeros(base_q + len(moving))
+    q[base_q:] = mid_range(lower[base_v:], upper[base_v:])
+    if floating_base:
+        q[3] = 1.0
+    names = [f"{BASE_JOINT}/{i}" for i in range(base_v)] + [j.name for j in moving]
+    frames = ([] if WORLD in urdf.links else [WORLD]) + list(urdf.links)
+    return Description(
+        name=urdf.name,
+        source=urdf.path,
+        nq=len(q),
+        nv=len(names),
+        joint_names=tuple(names),
+        frame_names=tuple(frames),
+        tool=_tool(urdf),
+        q_reference=q,
+        q_lower=lower,
+        q_upper=upper,
+        velocity_limit=np.concatenate([free, [j.velocity for j in moving]]),
+        torque_limit=np.concatenate([free, [j.effort for j in moving]]),
+        actuated=np.arange(len(names)) >= base_v,
+        quaternions=(3,) if floating_base else (),
+        floating_base=floating_base,
+        locked_joints=urdf.locked,
+    )
+
+
+def _parse(path: Path) -> ET.Element:
+    try:
+        root = ET.parse(path).getroot()
+    except OSError as error:
+        raise ModelError(f"{path}: {error.strerror or error}") from None
+    except (ET.ParseError, ValueError) as error:
+        raise ModelError(f"{path}: not XML ({error})") from None
+    if root.tag != "robot":
+        raise ModelError(f"{path}: the outermost element is <{root.tag}>, not <robot>")
+    if not root.findall("link"):
+        raise ModelError(f"{path}: no <link> in the robot")
+    return root
+
+
+def _check_numbers(root: ET.Element, path: Path) -> None:
+    for owner in (*root.findall("link/inertial"), *root.findall("joint")):
+        for element in owner.iter():
+            for key in NUMBERS & set(element.attrib):
+                try:
+                    values = [float(x) for x in element.attrib[key].split()]
+                except ValueError:
+                    values = []
+                size = 3 if key in VECTORS else 1
+                if len(values) != size or not np.isfinite(values).all():
+                    text = element.attrib[key]
+                    raise ModelError(
+                        f"{path}: {key}={text!r} of <{element.tag}> is not {size} number(s)"
+                    )
+
+
+def _name(element: ET.Element, path: Path) -> str:
+    name = element.get("name")
+    if not name:
+        raise ModelError(f"{path}: a <{element.tag}> has no name")
+    return name
+
+
+def _joint(
+    element: ET.Element, locked: Collection[str], links: Collection[str], path: Path
+) -> UrdfJoint:
+    name, kind = _name(element, path), element.get("type", "")
+    if kind not in (*MOVING, "fixed"):
+        raise ModelError(f"{path}: joint {name!r} has type {kind!r}, not fixed or one of {MOVING}")
+    ends = {}
+    for end in ("parent", "child"):
+        tag = element.find(end)
+        ends[end] = tag.get("link", "") if tag is not None else ""
+        if ends[end] not in links:
+            raise ModelError(f"{path}: {end} link {ends[end]!r} of joint {name!r} does not exist")
+    limit = element.find("limit")
+    if kind in ("revolute", "prismatic") and limit is None:
+        raise ModelError(f"{path}: joint {name!r} has no <limit>")
+    given = limit.attrib if limit is not None else {}
+    lower, upper = float(given.get("lower", 0.0)), float(given.get("upper", 0.0))
+    if kind in ("revolute", "prismatic") and lower > upper:
+        raise ModelError(f"{path}: lower limit of joint {name!r} is above its upper limit")
+    if kind == "continuous" or lower == upper:
+        lower, upper = -math.inf, math.inf
+    return UrdfJoint(
+        name=name,
+        kind="fixed" if name in locked else kind,
+        parent=ends["parent"],
+        child=ends["child"],
+        lower=lower,
+        upper=upper,
+        # Zero is how files say that nothing is known.
+        velocity=float(given.get("velocity", 0.0)) or math.inf,
+        effort=float(given.get("effort", 0.0)) or math.inf,
+        axis=_axis(element, path),
+        element=element,
+    )
+
+
+def _axis(element: ET.Element, path: Path) -> tuple[float, ...]:
+    tag = element.find("axis")
+    text = tag.get("xyz", "1 0 0") if tag is not None else "1 0 0"
+    direction = np.array(text.split(), dtype=float)
+    length = float(np.linalg.norm(direction))
+    if length == 0.0 and element.get("type") in MOVING:
+        raise ModelError(f"{path}: axis of joint {element.get('name')!r} has length zero")
+    return tuple((direction / (length or 1.0)).tolist())
+
+
+def _depth_first(
+    joints: dict[str, UrdfJoint], links: Collection[str], path: Path
+) -> tuple[str, tuple[UrdfJoint, ...]]:
+    children = {j.child for j in joints.values()}
+    roots = [link for link in links if link not in children]
+    if len(roots) != 1:
+        raise ModelError(f"{path}: {len(roots)} root links {roots}, not one")
+    below: dict[str, list[UrdfJoint]] = {}
+    for name in sorted(joints, reverse=True):
+        below.setdefault(joints[name].parent, []).append(joints[name])
+    ordered, pending = [], list(below.get(roots[0], []))
+    while pending:
+        joint = pending.pop()
+        ordered.append(joint)
+        pending.extend(below.get(joint.child, []))
+    if len(ordered) != len(links) - 1 or len(ordered) != len(joints):
+        raise ModelError(f"{path}: the joints do not connect the links to one tree")
+    return roots[0], tuple(ordered)
+
+
+def _tool(urdf: Urdf) -> str:
+    """Return the last link of the longest chain, counted in moving and then in all joints."""
+    depth = {urdf.root: (0, 0)}
+    for joint in urdf.joints:
+        moving, total = depth[joint.parent]
+        depth[joint.child] = (moving + joint.moving, total + 1)
+    return max(depth, key=lambda link: depth[link])

@@ -1,0 +1,152 @@
+"""Everything that a scenario file can say, with units, ranges and defaults."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated, Literal
+
+from pydantic import Field, field_validator, model_validator
+
+from opspace.scenario.fields import Checked, Entry, Quantity, problem, shown, whole
+from opspace.scenario.targets import Configuration
+from opspace.scenario.task_entries import AnyTask
+
+if TYPE_CHECKING:
+    from typing_extensions import Self
+
+ProfileName = Literal["linear", "cubic", "quintic", "half-sine", "tanh"]
+
+
+class Singularity(Entry):
+    """How directions that the robot is about to lose are faded out."""
+
+    lower: Annotated[float, Quantity("1", above=0.0)] = Field(
+        default=0.02, description="eigenvalue at and below which a direction is absent"
+    )
+    upper: Annotated[float, Quantity("1", above=0.0)] = Field(
+        default=0.1, description="eigenvalue at and above which a direction is fully active"
+    )
+    scale: Literal["relative", "absolute"] = Field(
+        default="relative",
+        description="relative to the eigenvalues at the start, or absolute [1/kg, 1/(kg·m²)]",
+    )
+    profile: ProfileName = Field(default="quintic", description="shape of the activation")
+
+    @model_validator(mode="after")
+    def _check_order(self) -> Self:
+        if self.lower >= self.upper:
+            raise problem(f"must be above lower, {self.lower:g}, not {self.upper:g}", "upper")
+        return self
+
+
+class JointLimits(Entry):
+    """How joints are kept within their limits."""
+
+    mode: Literal["admissible", "buffer"] = Field(
+        default="admissible",
+        description="act on the admissible acceleration, or within a buffer on the position",
+    )
+    joints: dict[str, Annotated[tuple[float, ...], Quantity("rad or m", size=2)]] = Field(
+        default_factory=dict, description="joint: [lower, upper] in place of the robot's own limits"
+    )
+    buffer: Annotated[float, Quantity("rad or m", above=0.0)] = Field(
+        default=0.1, description="width of the buffer inside each limit, for mode buffer [rad or m]"
+    )
+    brake_acceleration: Annotated[float, Quantity("rad/s²", above=0.0)] | None = Field(
+        default=None,
+        description="what a joint can brake with [rad/s²]; null derives it from the robot",
+    )
+    profile: ProfileName = Field(default="quintic", description="shape of the activation")
+
+    @field_validator("joints")
+    @classmethod
+    def _check_order(cls, joints: dict[str, tuple[float, ...]]) -> dict[str, tuple[float, ...]]:
+        for joint, (lower, upper) in joints.items():
+            if lower >= upper:
+                raise problem(f"must be [lower, upper], not {shown([lower, upper])}", joint)
+        return joints
+
+
+class Plant(Entry):
+    """What the simulated robot has and the controller does not know about."""
+
+    friction: bool = Field(default=False, description="simulate the joints' friction")
+    torque_limits: bool = Field(
+        default=True, description="saturate the torque at the robot's limits"
+    )
+
+
+class Stop(Entry):
+    """When a run is given up."""
+
+    max_joint_speed: Annotated[float, Quantity("rad/s or m/s", above=0.0)] | None = Field(
+        default=None, description="joint speed that ends the run [rad/s or m/s]; null is none"
+    )
+    max_torque: Annotated[float, Quantity("N·m", above=0.0)] | None = Field(
+        default=None, description="joint torque that ends the run [N·m]; null is none"
+    )
+
+
+class Scenario(Entry):
+    """One run: a robot, its tasks and how long."""
+
+    description: str = Field(default="", description="what the scenario shows")
+    robot: str = Field(description="name of a robot, or path of a .urdf or .xml file")
+    backend: Literal["pinocchio", "mujoco"] = Field(
+        default="pinocchio", description="library that computes the controller's dynamics"
+    )
+    floating_base: bool = Field(default=False, description="free the root link")
+    duration: Annotated[float, Quantity("s", above=0.0, at_most=3600.0)] = Field(
+        description="simulated time [s]"
+    )
+    dt: Annotated[float, Quantity("s", above=0.0, at_most=0.1)] = Field(
+        default=0.001, description="control tick [s]"
+    )
+    seed: Annotated[int, Checked(whole)] = Field(
+        default=0, description="seed of every random number"
+    )
+    start: Configuration = Field(
+        default="reference", description="configuration at the start [rad or m], or its name"
+    )
+    method: Literal["transition", "switch", "none"] = Field(
+        default="transition",
+        description="activations fade, switch between 0 and 1, or are not used at all",
+    )
+    blending: Literal["idv", "chain"] = Field(
+        default="idv", description="blend of simultaneous transitions: 2^k or k + 1 hard torques"
+    )
+    bias: Literal["joint", "task"] = Field(
+        default="joint",
+        description="compensate gravity and Coriolis in every joint or in the tasks only",
+    )
+    tasks: dict[str, AnyTask] = Field(description="name: what the robot is asked for")
+    joint_limits: JointLimits | None = Field(
+        default_factory=JointLimits, description="joint limit avoidance; null is none"
+    )
+    singularity: Singularity | None = Field(
+        default_factory=Singularity, description="singularity avoidance; null is none"
+    )
+    plant: Plant = Field(default_factory=Plant, description="the simulated robot")
+    stop: Stop = Field(default_factory=Stop, description="when a run is given up")
+
+    @field_validator("robot")
+    @classmethod
+    def _check_robot(cls, robot: str) -> str:
+        if not robot.strip():
+            raise problem("must be the name of a robot or the path of a robot file")
+        return robot
+
+    @field_validator("tasks")
+    @classmethod
+    def _check_names(cls, tasks: dict[str, AnyTask]) -> dict[str, AnyTask]:
+        if not tasks:
+            raise problem("must have at least one task")
+        for name in tasks:
+            if not name.strip() or "/" in name or name != name.strip():
+                raise problem("a task's name must be text without a slash", name)
+        return tasks
+
+    @model_validator(mode="after")
+    def _check_tick(self) -> Self:
+        if self.dt > self.duration:
+            raise problem(f"must not be longer than the duration, {self.duration:g} s", "dt")
+        return self

@@ -1,0 +1,1 @@
+"""The plant and the one loop around it."""

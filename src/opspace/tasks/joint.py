@@ -1,0 +1,68 @@
+"""One joint of the robot."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from opspace.errors import InputError
+from opspace.tasks.posture import PostureTask
+from opspace.tasks.references.sample import Reference
+from opspace.tasks.validation import Array, numbers
+
+if TYPE_CHECKING:
+    from opspace.robots.protocol import Robot
+
+
+class JointTask(PostureTask):
+    """Moves one joint of one degree of freedom: f* = a_d + kv (v_d − v) + kp (q_d − q).
+
+    Args:
+        joint: Name of the joint.
+        target: Value in rad (m for a prismatic joint), a reference that gives such values, or
+            None to hold the value found first.
+        kp: Stiffness, 1/s².
+        kv: Damping, 1/s; None is critical, 2 sqrt(kp).
+        max_speed: Speed that the error may ask for, rad/s or m/s.
+        name: Name of the task; None is the name of the joint.
+
+    Raises:
+        InputError: A gain or target that cannot be used.
+    """
+
+    def __init__(
+        self,
+        joint: str,
+        target: ArrayLike | Reference | None = None,
+        *,
+        kp: float = 100.0,
+        kv: float | None = None,
+        max_speed: float | None = None,
+        name: str | None = None,
+    ) -> None:
+        super().__init__(
+            target,
+            kp=kp,
+            kv=kv,
+            joints=[joint],
+            max_speed=max_speed,
+            name=joint if name is None else name,
+        )
+
+    def _resolve(self, robot: Robot) -> None:
+        super()._resolve(robot)
+        layout = self._layout
+        if layout is not None and len(layout.entries) * self.rows != 1:
+            raise InputError(
+                f"task {self.name!r}: a joint task needs a joint of one degree of freedom, but "
+                f"the configuration of {', '.join(layout.names)} is {len(layout.entries)} numbers"
+            )
+
+    def _check_value(self, value: ArrayLike, what: str) -> Array:
+        return super()._check_value(np.atleast_1d(numbers(value, what)), what)
+
+    def _vector(self, value: ArrayLike | None, what: str) -> Array:
+        rate = None if value is None else np.atleast_1d(numbers(value, what))
+        return super()._vector(rate, what)

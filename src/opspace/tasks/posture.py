@@ -1,0 +1,105 @@
+"""Posture: the robot's joints themselves."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from opspace.errors import InputError
+from opspace.tasks.base import TaskTerms
+from opspace.tasks.joint_layout import Layout, joint_layout
+from opspace.tasks.references.sample import Reference
+from opspace.tasks.tracking import Target, TrackingTask
+from opspace.tasks.validation import Array, finite_array
+
+if TYPE_CHECKING:
+    from opspace.robots.protocol import Robot
+
+
+class PostureTask(TrackingTask):
+    """Moves joints to a posture: f* = a_d + kv (v_d − v) + kp (q_d ⊖ q) on the selected rows.
+
+    J is the selected rows of the identity, so the drift is zero. q_d ⊖ q is the robot's
+    ``difference``. A floating base is left alone unless its coordinates are named. Once bound,
+    ``target`` reads back as the entries of q that belong to the selected joints.
+
+    Args:
+        target: Whole configuration (nq,), or one value for each selected joint (m,), in rad (m
+            for prismatic joints); a reference that gives one of these with v and a (m,); or None
+            to hold the posture found first.
+        kp: Stiffness, a number or one per selected joint, 1/s².
+        kv: Damping, a number or one per selected joint, 1/s; None is critical, 2 sqrt(kp).
+        joints: Names of the joints to control; None is every actuated joint.
+        max_speed: Norm of the joint speed that the error may ask for, rad/s.
+        name: Name of the task.
+
+    Raises:
+        InputError: A gain, target or list of joints that cannot be used.
+    """
+
+    def __init__(
+        self,
+        target: ArrayLike | Reference | None = None,
+        *,
+        kp: ArrayLike = 100.0,
+        kv: ArrayLike | None = None,
+        joints: Sequence[str] | None = None,
+        max_speed: float | None = None,
+        name: str = "posture",
+    ) -> None:
+        if isinstance(joints, str) or (joints is not None and len(joints) == 0):
+            raise InputError(f"task {name!r}: joints must be a list of names, not {joints!r}")
+        super().__init__(
+            name, rows=0, units=(), motion_size=None, kp=kp, kv=kv, max_speed=max_speed
+        )
+        self._joints = None if joints is None else tuple(joints)
+        self._layout: Layout | None = None
+        self.target = target
+
+    def evaluate(self, robot: Robot, t: float) -> TaskTerms:
+        """Return the terms of the task at the robot's present state."""
+        self._require_bound(robot)
+        layout = self._layout
+        assert layout is not None  # bound
+        q = robot.q
+        desired = self._desired(t, lambda: q[layout.entries])
+        q_desired = q.copy()
+        q_desired[layout.entries] = desired.x
+        error = robot.difference(q, q_desired)[layout.coordinates]
+        velocity_error = desired.v - robot.v[layout.coordinates]
+        return TaskTerms(
+            J=layout.J,
+            drift=layout.drift,
+            acceleration=self._gains.acceleration(error, velocity_error, desired.a),
+            error=error,
+        )
+
+    def _resolve(self, robot: Robot) -> None:
+        layout = joint_layout(robot, self._joints)
+        self._layout = layout
+        self.rows = self._motion_size = len(layout.coordinates)
+        self.units = layout.units
+        self._recheck()
+
+    def _recheck(self) -> None:
+        """Check again what was given before the robot was known."""
+        gains, target = self._gains, self._target
+        self._set_gains(gains.kp, None if gains.critical else gains.kv, gains.max_speed)
+        what = f"task {self.name!r}: target"
+        self._target = Target(
+            self._check_value(target.goal, what)
+            if isinstance(target.goal, np.ndarray)
+            else target.goal,
+            self._vector(target.velocity if target.velocity.size else None, f"{what}_velocity"),
+            self._vector(
+                target.acceleration if target.acceleration.size else None, f"{what}_acceleration"
+            ),
+        )
+
+    def _check_value(self, value: ArrayLike, what: str) -> Array:
+        """Return the configuration entries of the selected joints."""
+        values = finite_array(value, (None,), what)
+        return values if self._layout is None else self._layout.select(values, what)

@@ -1,0 +1,161 @@
+"""What is controlled of a motion: its position, its orientation, or both."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from opspace.errors import InputError
+from opspace.tasks.motions import Motion
+from opspace.tasks.rotation import as_rotation, homogeneous
+from opspace.tasks.rotation_error import RotationError
+from opspace.tasks.validation import Array, finite_array, numbers
+
+
+class Quantity(Protocol):
+    """A part of a motion that can have a target.
+
+    Attributes:
+        block: Its rows among linear then angular.
+        units: Unit of each of these rows.
+        speed_groups: Rows that share a speed limit.
+    """
+
+    block: slice
+    units: tuple[str, ...]
+    speed_groups: tuple[slice, ...]
+
+    def check(self, value: ArrayLike, what: str) -> Array:
+        """Return a target value in the form that ``error`` reads, or raise InputError."""
+        ...
+
+    def value(self, motion: Motion) -> Array:
+        """Return the present value in the same form."""
+        ...
+
+    def error(self, motion: Motion, desired: Array) -> Array:
+        """Return x_d − x, (k,)."""
+        ...
+
+    def reset(self) -> None:
+        """Forget the past."""
+        ...
+
+
+class Position:
+    """Position x (3,): error x_d − x."""
+
+    block = slice(0, 3)
+    units: tuple[str, ...] = ("m", "m", "m")
+    speed_groups: tuple[slice, ...] = (slice(None),)
+
+    def check(self, value: ArrayLike, what: str) -> Array:
+        """Return (3,) m."""
+        return finite_array(value, (3,), what)
+
+    def value(self, motion: Motion) -> Array:
+        """Return the position."""
+        return motion.position
+
+    def error(self, motion: Motion, desired: Array) -> Array:
+        """Return x_d − x, m."""
+        return desired - motion.position
+
+    def reset(self) -> None:
+        """Do nothing: a position has no past."""
+
+
+class Orientation:
+    """Orientation R (3, 3): error R log(Rᵀ R_d) = log(R_d Rᵀ), kept continuous past half a turn."""
+
+    block = slice(3, 6)
+    units: tuple[str, ...] = ("rad", "rad", "rad")
+    speed_groups: tuple[slice, ...] = (slice(None),)
+
+    def __init__(self) -> None:
+        self._error = RotationError()
+
+    def check(self, value: ArrayLike, what: str) -> Array:
+        """Return a rotation matrix from one or from a quaternion wxyz."""
+        return as_rotation(value, what)
+
+    def value(self, motion: Motion) -> Array:
+        """Return the rotation matrix."""
+        return motion.rotation
+
+    def error(self, motion: Motion, desired: Array) -> Array:
+        """Return the rotation vector from R to R_d, rad."""
+        return self._error(desired @ motion.rotation.T)
+
+    def reset(self) -> None:
+        """Forget which way round the error went."""
+        self._error.reset()
+
+
+class Pose:
+    """Position and orientation as a homogeneous matrix (4, 4)."""
+
+    block = slice(0, 6)
+    units: tuple[str, ...] = ("m", "m", "m", "rad", "rad", "rad")
+    speed_groups: tuple[slice, ...] = (slice(0, 3), slice(3, 6))
+
+    def __init__(self) -> None:
+        self._orientation = Orientation()
+
+    def check(self, value: ArrayLike, what: str) -> Array:
+        """Return the (4, 4) matrix of a pose in any of the accepted forms."""
+        return as_pose(value, what)
+
+    def value(self, motion: Motion) -> Array:
+        """Return the (4, 4) matrix."""
+        return homogeneous(motion.position, motion.rotation)
+
+    def error(self, motion: Motion, desired: Array) -> Array:
+        """Return position error above rotation vector, m and rad."""
+        turn = self._orientation.error(motion, desired[:3, :3])
+        return np.concatenate((desired[:3, 3] - motion.position, turn))
+
+    def reset(self) -> None:
+        """Forget which way round the rotation error went."""
+        self._orientation.reset()
+
+
+def as_pose(value: ArrayLike, what: str) -> Array:
+    """Read a pose.
+
+    Args:
+        value: (4, 4) homogeneous matrix, (7,) position and quaternion [x y z, qw qx qy qz], or a
+            pair (position, orientation) with the orientation as matrix or quaternion.
+        what: What the value is, at the start of the error message.
+
+    Returns:
+        (4, 4) homogeneous matrix with an orthonormal rotation, read-only.
+
+    Raises:
+        InputError: None of these forms, not finite, or not a rotation.
+    """
+    if isinstance(value, tuple | list) and len(value) == 2:
+        position, orientation = value
+    else:
+        position, orientation = _split(numbers(value, what), what)
+    pose = homogeneous(
+        finite_array(position, (3,), f"{what} position"),
+        as_rotation(orientation, f"{what} orientation"),
+    )
+    pose.flags.writeable = False
+    return pose
+
+
+def _split(given: Array, what: str) -> tuple[Array, Array]:
+    if given.shape == (7,):
+        return given[:3], given[3:]
+    if given.shape != (4, 4):
+        raise InputError(
+            f"{what} must be a (4, 4) matrix, seven numbers [x y z, qw qx qy qz] "
+            f"or a pair (position, orientation), not of shape {given.shape}"
+        )
+    if not np.array_equal(given[3], (0.0, 0.0, 0.0, 1.0)):
+        raise InputError(f"{what}: the last row of a (4, 4) pose must be 0 0 0 1")
+    return given[:3, 3], given[:3, :3]

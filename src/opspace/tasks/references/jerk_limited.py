@@ -1,0 +1,79 @@
+"""The fastest motion within limits of velocity, acceleration and jerk."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from opspace.errors import InputError
+from opspace.tasks.references.sample import Sample
+from opspace.tasks.validation import Array, finite, finite_array
+
+
+class JerkLimited:
+    """Moves from rest to rest as fast as velocity, acceleration and jerk limits allow.
+
+    All coordinates arrive at the same time, and the path is not straight in general (Ruckig,
+    Berscheid and Kröger 2021). The motion is computed once, when the reference is built. Holds
+    the start before ``start_time`` and the goal after the motion.
+
+    Args:
+        start: (k,) first value.
+        goal: (k,) last value.
+        max_velocity: Limit of each coordinate, a number or (k,), unit/s.
+        max_acceleration: Limit, a number or (k,), unit/s².
+        max_jerk: Limit, a number or (k,), unit/s³.
+        start_time: Time at which it begins, s.
+
+    Attributes:
+        duration: Time of the motion, s.
+
+    Raises:
+        InputError: Shapes that differ, values that are not finite, or a limit not above zero.
+    """
+
+    def __init__(
+        self,
+        start: ArrayLike,
+        goal: ArrayLike,
+        *,
+        max_velocity: ArrayLike,
+        max_acceleration: ArrayLike,
+        max_jerk: ArrayLike,
+        start_time: float = 0.0,
+    ) -> None:
+        from ruckig import InputParameter, Result, Ruckig, Trajectory  # noqa: PLC0415 - lazy
+
+        self.start = finite_array(start, (None,), "JerkLimited: start")
+        self.goal = finite_array(goal, self.start.shape, "JerkLimited: goal")
+        self.start_time = finite(start_time, "JerkLimited: start_time")
+        size = len(self.start)
+        motion = InputParameter(size)
+        motion.current_position = self.start.tolist()
+        motion.target_position = self.goal.tolist()
+        motion.max_velocity = _limits(max_velocity, size, "max_velocity").tolist()
+        motion.max_acceleration = _limits(max_acceleration, size, "max_acceleration").tolist()
+        motion.max_jerk = _limits(max_jerk, size, "max_jerk").tolist()
+        self._trajectory = Trajectory(size)
+        result = Ruckig(size).calculate(motion, self._trajectory)
+        if result not in (Result.Working, Result.Finished):
+            raise InputError(f"JerkLimited: no motion within these limits ({result.name})")
+        self.duration: float = self._trajectory.duration
+        self._rest = np.zeros(size)
+
+    def __call__(self, t: float, /) -> Sample:
+        """Return the desired motion at time t, s."""
+        elapsed = t - self.start_time
+        if elapsed <= 0.0:
+            return Sample(self.start, self._rest, self._rest)
+        if elapsed >= self.duration:
+            return Sample(self.goal, self._rest, self._rest)
+        x, v, a = self._trajectory.at_time(elapsed)
+        return Sample(np.array(x), np.array(v), np.array(a))
+
+
+def _limits(value: ArrayLike, size: int, what: str) -> Array:
+    limits = finite_array(value, (size,) if np.ndim(value) else (), f"JerkLimited: {what}")
+    if (limits <= 0.0).any():
+        raise InputError(f"JerkLimited: {what} must be above zero, not {limits.tolist()}")
+    return np.broadcast_to(limits, (size,))

@@ -1,0 +1,49 @@
+"""The rotation from where a frame is to where it should be, as a continuous vector."""
+
+from __future__ import annotations
+
+import math
+
+from opspace.tasks.rotation import Quaternion, quaternion_from_matrix, rotation_vector
+from opspace.tasks.validation import Array
+
+# How far past half a turn the direction chosen before is kept, rad. Noise and overshoot near half
+# a turn are far smaller; at a full turn the direction would be lost, so it cannot be kept for ever.
+BRANCH_HOLD = 0.5 * math.pi
+
+
+class RotationError:
+    """Logarithm of a rotation error that remembers which way round it went.
+
+    The logarithm of SO(3) jumps from π to −π about its axis at half a turn. A controller that
+    follows it would reverse its command there, and again with every bit of noise. This one
+    follows the unit quaternion of the error continuously instead: an error that grows past π goes
+    on growing about the same axis up to π + ``BRANCH_HOLD`` and takes the short way only then.
+    Below π and without a past it is the plain logarithm.
+    """
+
+    def __init__(self) -> None:
+        self._previous: Quaternion | None = None
+
+    def __call__(self, E: Array) -> Array:
+        """Return the rotation vector of the error E = R_d Rᵀ.
+
+        Args:
+            E: (3, 3) rotation that leads from the present to the desired orientation.
+
+        Returns:
+            (3,) rotation vector, rad.
+        """
+        q = quaternion_from_matrix(E)
+        previous = self._previous
+        if previous is not None:
+            agreement = sum(a * b for a, b in zip(q, previous, strict=True))
+            # w = cos(angle / 2) of the long way round is −q[0].
+            if agreement < 0.0 and -q[0] >= math.cos(0.5 * (math.pi + BRANCH_HOLD)):
+                q = (-q[0], -q[1], -q[2], -q[3])
+        self._previous = q
+        return rotation_vector(q)
+
+    def reset(self) -> None:
+        """Forget the past: the next error takes the short way."""
+        self._previous = None

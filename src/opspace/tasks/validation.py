@@ -1,0 +1,106 @@
+"""Checks of the numbers that a user hands to a task or a reference."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from opspace.errors import InputError
+
+Array = NDArray[np.float64]
+
+
+def finite_array(value: ArrayLike, shape: tuple[int | None, ...] | None, what: str) -> Array:
+    """Copy a value into a read-only float64 array of the given shape.
+
+    Args:
+        value: Numbers to check.
+        shape: Required shape, None for any; within it None stands for any length of that axis.
+        what: What the value is, at the start of the error message.
+
+    Returns:
+        A read-only copy.
+
+    Raises:
+        InputError: Not numbers, another shape, or a value that is not finite.
+    """
+    array = numbers(value, what)
+    if shape is not None and not _fits(array.shape, shape):
+        raise InputError(f"{what} must have shape {_words(shape)}, not {array.shape}")
+    if not np.isfinite(array).all():
+        raise InputError(f"{what} must be finite, not {array.tolist()}")
+    array.flags.writeable = False
+    return array
+
+
+def numbers(value: ArrayLike, what: str) -> Array:
+    """Copy a value into a float64 array of whatever shape it has.
+
+    Args:
+        value: Numbers.
+        what: What the value is, at the start of the error message.
+
+    Returns:
+        A copy.
+
+    Raises:
+        InputError: Not numbers, or rows of different lengths.
+    """
+    try:
+        return np.array(value, dtype=float)
+    except (TypeError, ValueError):
+        raise InputError(f"{what} must be numbers, not {value!r}") from None
+
+
+def positive(value: float, what: str) -> float:
+    """Return a finite number above zero.
+
+    Args:
+        value: Number to check.
+        what: What the value is, at the start of the error message.
+
+    Returns:
+        The number as a float.
+
+    Raises:
+        InputError: Not a number, not finite, zero or below.
+    """
+    number = finite(value, what)
+    if number <= 0.0:
+        raise InputError(f"{what} must be above zero, not {number}")
+    return number
+
+
+def finite(value: float, what: str) -> float:
+    """Return a finite number.
+
+    Args:
+        value: Number to check.
+        what: What the value is, at the start of the error message.
+
+    Returns:
+        The number as a float.
+
+    Raises:
+        InputError: Not a number or not finite.
+    """
+    try:
+        number = float(value)
+    except (TypeError, ValueError):
+        raise InputError(f"{what} must be a number, not {value!r}") from None
+    if not math.isfinite(number):
+        raise InputError(f"{what} must be finite, not {number}")
+    return number
+
+
+def _fits(got: tuple[int, ...], wanted: tuple[int | None, ...]) -> bool:
+    return len(got) == len(wanted) and all(
+        want is None or size == want for size, want in zip(got, wanted, strict=True)
+    )
+
+
+def _words(shape: tuple[int | None, ...]) -> str:
+    inner = ", ".join("any" if size is None else str(size) for size in shape)
+    return f"({inner},)" if len(shape) == 1 else f"({inner})"
