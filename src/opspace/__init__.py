@@ -1,1 +1,113 @@
-"""Operational space control with continuous task transitions."""
+"""Operational space control with continuous task transitions.
+
+Everything public is here under one name; it is imported when it is first used, so that
+``import opspace`` costs nothing.
+"""
+
+from importlib import import_module, metadata
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from opspace.controller import Calibration as Calibration
+    from opspace.controller import Command as Command
+    from opspace.controller import Controller as Controller
+    from opspace.controller import LevelStatus as LevelStatus
+    from opspace.controller import Singularity as Singularity
+    from opspace.controller import Status as Status
+    from opspace.controller import TaskStatus as TaskStatus
+    from opspace.errors import InputError as InputError
+    from opspace.errors import MissingExtraError as MissingExtraError
+    from opspace.errors import ModelError as ModelError
+    from opspace.errors import OpspaceError as OpspaceError
+    from opspace.errors import RecordingError as RecordingError
+    from opspace.errors import ScenarioError as ScenarioError
+    from opspace.errors import UnknownNameError as UnknownNameError
+    from opspace.law import Activation as Activation
+    from opspace.law import Buffer as Buffer
+    from opspace.law import LawInfo as LawInfo
+    from opspace.law import Profile as Profile
+    from opspace.law import Ramp as Ramp
+    from opspace.law import SigmaBuffer as SigmaBuffer
+    from opspace.law import TaskSet as TaskSet
+    from opspace.law import intermediate_values as intermediate_values
+    from opspace.law import task_torque as task_torque
+    from opspace.record import Column as Column
+    from opspace.record import Recorder as Recorder
+    from opspace.record import Recording as Recording
+    from opspace.record import load as load
+    from opspace.record.observer import TickRecorder as TickRecorder
+    from opspace.robots import Robot as Robot
+    from opspace.robots import RobotInfo as RobotInfo
+    from opspace.robots import available_robots as available_robots
+    from opspace.robots import load_robot as load_robot
+    from opspace.sim import Observer as Observer
+    from opspace.sim import Outcome as Outcome
+    from opspace.sim import Plant as Plant
+    from opspace.sim import StopRule as StopRule
+    from opspace.sim import simulate as simulate
+    from opspace.stack import Stack as Stack
+    from opspace.tasks import Chain as Chain
+    from opspace.tasks import Circle as Circle
+    from opspace.tasks import ComTask as ComTask
+    from opspace.tasks import Constant as Constant
+    from opspace.tasks import JerkLimited as JerkLimited
+    from opspace.tasks import JointLimits as JointLimits
+    from opspace.tasks import JointTask as JointTask
+    from opspace.tasks import MinimumJerk as MinimumJerk
+    from opspace.tasks import OrientationMinimumJerk as OrientationMinimumJerk
+    from opspace.tasks import OrientationTask as OrientationTask
+    from opspace.tasks import PoseReference as PoseReference
+    from opspace.tasks import PoseTask as PoseTask
+    from opspace.tasks import PositionTask as PositionTask
+    from opspace.tasks import PostureTask as PostureTask
+    from opspace.tasks import Reference as Reference
+    from opspace.tasks import RelativeOrientationTask as RelativeOrientationTask
+    from opspace.tasks import RelativePoseTask as RelativePoseTask
+    from opspace.tasks import RelativePositionTask as RelativePositionTask
+    from opspace.tasks import Sample as Sample
+    from opspace.tasks import Task as Task
+    from opspace.tasks import TaskTerms as TaskTerms
+    from opspace.tasks import TrackingTask as TrackingTask
+    from opspace.tasks import ViaPoints as ViaPoints
+
+_NAMES = {
+    "opspace.controller": (
+        "Calibration Command Controller LevelStatus Singularity Status TaskStatus"
+    ),
+    "opspace.errors": (
+        "InputError MissingExtraError ModelError OpspaceError RecordingError ScenarioError "
+        "UnknownNameError"
+    ),
+    "opspace.law": (
+        "Activation Buffer LawInfo Profile Ramp SigmaBuffer TaskSet intermediate_values task_torque"
+    ),
+    "opspace.record": "Column Recorder Recording load",
+    "opspace.record.observer": "TickRecorder",
+    "opspace.robots": "Robot RobotInfo available_robots load_robot",
+    "opspace.sim": "Observer Outcome Plant StopRule simulate",
+    "opspace.stack": "Stack",
+    "opspace.tasks": (
+        "Chain Circle ComTask Constant JerkLimited JointLimits JointTask MinimumJerk "
+        "OrientationMinimumJerk OrientationTask PoseReference PoseTask PositionTask PostureTask "
+        "Reference RelativeOrientationTask RelativePoseTask RelativePositionTask Sample Task "
+        "TaskTerms TrackingTask ViaPoints"
+    ),
+}
+_HOME = {name: module for module, names in _NAMES.items() for name in names.split()}
+
+__all__ = ["__version__", *sorted(_HOME)]  # noqa: PLE0604  # pyright: ignore[reportUnsupportedDunderAll]
+
+
+def __getattr__(name: str) -> Any:
+    if name == "__version__":
+        found: Any = metadata.version("opspace")
+    elif name in _HOME:
+        found = getattr(import_module(_HOME[name]), name)
+    else:
+        raise AttributeError(f"module 'opspace' has no attribute {name!r}")
+    globals()[name] = found
+    return found
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

@@ -8,6 +8,8 @@ import os
 import sys
 from collections.abc import Sequence
 from dataclasses import asdict
+from enum import Enum
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -18,6 +20,7 @@ BAD_INPUT = 2
 INTERRUPTED = 130
 
 _UNBROKEN = 10_000
+_UNITS = {"orientation": "1/(kg·m²)", "position": "1/kg"}
 
 # Typer brings its own copy of click or uses the installed one, depending on its version; the base
 # of its BadParameter is the usage error of the one in use.
@@ -125,6 +128,122 @@ def robots(
             for robot in found
         ],
     )
+
+
+Overrides = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="KEY=VALUE", help="Change one value; may be repeated."),
+]
+
+
+@app.command(epilog="Example: opspace run singularity --set tasks.position.kp=200 --out results/a")
+def run(
+    scenario: Annotated[
+        str, typer.Argument(help="A scenario file (.yaml), or the name of one that is shipped.")
+    ],
+    overrides: Overrides = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Directory to write to. [default: results/NAME]")
+    ] = None,
+    overwrite: Annotated[
+        bool, typer.Option("--overwrite", help="Replace a recording that is already there.")
+    ] = False,
+) -> None:
+    """Simulate a scenario, record it and measure it."""
+    from opspace.scenario import load_scenario
+    from opspace.scenario.progress import ProgressBar
+    from opspace.scenario.run import run_scenario
+    from opspace.scenario.tables import metrics_table
+
+    loaded = load_scenario(scenario, overrides or ())
+    out = out or Path("results") / Path(scenario).stem
+    with ProgressBar() as progress:
+        result = run_scenario(
+            loaded, out, title=Path(scenario).stem, progress=progress, overwrite=overwrite
+        )
+    _print_table(*metrics_table({"value": result.metrics}))
+    if not result.outcome.completed:
+        print(f"stopped at {result.outcome.t:.3f} s: {result.outcome.reason}")
+    print(f"results: {out}")
+
+
+class Which(str, Enum):
+    """What can be reproduced."""
+
+    SINGULARITY = "singularity"
+    JOINT_LIMIT = "joint-limit"
+    ALL = "all"
+
+
+@app.command(epilog="Example: opspace reproduce all --robot panda --out results/panda")
+def reproduce(
+    which: Annotated[Which, typer.Argument(help="The experiment.")] = Which.ALL,
+    robot: Annotated[
+        str, typer.Option(help="Name of a robot, or path of a .urdf or .xml file.")
+    ] = "puma560",
+    out: Annotated[Path, typer.Option(help="Directory to write to.")] = Path("results"),
+) -> None:
+    """Repeat the paper's experiments: without the method, with a hard switch, and with it."""
+    from opspace.scenario.progress import ProgressBar
+    from opspace.scenario.reproduce import EXPERIMENTS, draw, reproduce
+    from opspace.scenario.tables import metrics_table
+
+    wanted = EXPERIMENTS if which is Which.ALL else (which.value,)
+    with ProgressBar() as progress:
+        done = reproduce(wanted, robot, out, progress=progress)
+    for found in done:
+        print(f"\n{found.experiment.name}: {found.experiment.title}")
+        _print_table(*metrics_table({name: run.metrics for name, run in found.runs.items()}))
+    for problem in draw(done, out):
+        print(problem, file=sys.stderr)
+    print(f"results: {out}")
+
+
+@app.command(epilog="Example: opspace check ur5")
+def check(
+    robot: Annotated[str, typer.Argument(help="Name of a robot, or path of a .urdf or .xml file.")],
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of tables.")] = False,
+) -> None:
+    """Tell what the controller will see of a robot."""
+    from opspace.robots import load_robot
+    from opspace.scenario.check import check_robot, to_plain
+    from opspace.scenario.tables import joints_table
+
+    report = check_robot(load_robot(robot))
+    if as_json:
+        print(json.dumps(to_plain(report), indent=1, ensure_ascii=False))
+        return
+    print(f"{report.robot}: {report.dof} degrees of freedom, tool {report.tool!r}")
+    print(f"file: {report.source}\n")
+    _print_table(*joints_table(report.joints))
+    for task, sigma in report.sigma.items():
+        values = ", ".join(f"{value:.3g}" for value in sigma)
+        print(f"\n{task}: eigenvalues {values} at the reference posture", end="")
+        print(f" (1 is the mean over the workspace, {report.scale[task]:.3g} {_UNITS[task]})")
+    lower, upper = report.buffer
+    print(f"\nbuffer: a direction is absent below {lower:g} and fully active above {upper:g}")
+    for warning in report.warnings:
+        print(f"warning: {warning}")
+
+
+@app.command(epilog="Example: opspace plot results/singularity/transition tau tool/x")
+def plot(
+    recording: Annotated[Path, typer.Argument(help="Directory of a recording.", metavar="RUN")],
+    columns: Annotated[
+        list[str] | None,
+        typer.Argument(help="Columns or groups of columns. [default: q v tau tasks]"),
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="File to write (.png). [default: RUN/plot.png]")
+    ] = None,
+) -> None:
+    """Draw columns of a recording over time."""
+    from opspace.plots import plot_columns, save
+    from opspace.record import load
+
+    path = out or recording / "plot.png"
+    save(plot_columns({recording.name: load(recording)}, columns or ()), path)
+    print(f"results: {path}")
 
 
 def _print_table(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> None:

@@ -10,6 +10,7 @@ from opspace.law import PROFILES, Buffer, Profile, Ramp
 
 MANY = settings(max_examples=300)
 UNIT = st.floats(0.001, 0.999)
+SMOOTH = [name for name in PROFILES if name != "step"]
 
 
 @pytest.mark.parametrize("name", PROFILES)
@@ -19,12 +20,13 @@ def test_profiles_rise_from_zero_to_one(name):
     assert values[0] == 0.0
     assert values[-1] == 1.0
     assert np.all(np.diff(values) >= 0)
-    assert profile(0.5).value == pytest.approx(0.5, abs=1e-12)
+    if name != "step":
+        assert profile(0.5).value == pytest.approx(0.5, abs=1e-12)
     for outside in (-1.0, 0.0, 1.0, 2.0):
         assert profile(outside)[1:] == (0.0, 0.0)
 
 
-@pytest.mark.parametrize("name", PROFILES)
+@pytest.mark.parametrize("name", SMOOTH)
 @MANY
 @given(s=UNIT)
 def test_slope_and_curvature_are_the_derivatives(name, s):
@@ -49,7 +51,7 @@ def test_smoothness_at_the_ends(name, order):
 
 
 @MANY
-@given(UNIT, st.floats(-5, 5), st.floats(0.01, 10), st.sampled_from(PROFILES), st.booleans())
+@given(UNIT, st.floats(-5, 5), st.floats(0.01, 10), st.sampled_from(SMOOTH), st.booleans())
 def test_a_buffer_is_its_profile_between_two_edges(s, off, width, name, falling):
     on = off - width if falling else off + width
     buffer, profile = Buffer(off, on, name), Profile(name)(s)
@@ -73,7 +75,7 @@ def test_unknown_profiles_are_named_with_the_choices():
 
 
 @MANY
-@given(st.floats(-100, 100), st.floats(0.01, 10), st.sampled_from(PROFILES), UNIT)
+@given(st.floats(-100, 100), st.floats(0.01, 10), st.sampled_from(SMOOTH), UNIT)
 def test_an_undisturbed_ramp_is_the_profile_of_time(start, duration, name, s):
     ramp = Ramp.resting(0.0, name).towards(1.0, duration, start)
     assert ramp(start).value == 0.0

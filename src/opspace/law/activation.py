@@ -66,6 +66,10 @@ def _tanh(s: float) -> Activation:
     )
 
 
+def _step(s: float) -> Activation:
+    return _ON if s >= 0.5 else _OFF
+
+
 _SHAPES: Mapping[str, Callable[[float], Activation]] = MappingProxyType(
     {
         "linear": _linear,
@@ -73,11 +77,12 @@ _SHAPES: Mapping[str, Callable[[float], Activation]] = MappingProxyType(
         "quintic": _quintic,
         "half-sine": _half_sine,
         "tanh": _tanh,
+        "step": _step,
     }
 )
 
 PROFILES = tuple(_SHAPES)
-"""Names of the profiles, from the least to the most often differentiable (half-sine is C¹)."""
+"""Names of the profiles. ``step`` is the hard switch that all of this avoids, for comparisons."""
 
 
 @dataclass(frozen=True)
@@ -92,6 +97,7 @@ class Profile:
     quintic    10 s³ − 15 s⁴ + 6 s⁵                            C²
     half-sine  ½ − ½ cos(π s)                                  C¹
     tanh       ½ (1 + tanh(1/(1 − s) − 1/s))                   C^∞
+    step       0 below ½, 1 from there                         a jump
     ========== =============================================== ==========
 
     The torque is as smooth in time as its activations, so quintic is the default everywhere.

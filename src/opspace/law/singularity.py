@@ -134,6 +134,12 @@ def solve_level_smoothly(
     return LevelOutcome(alternatives, Spectrum(sigma, activation, U[:, :k]))
 
 
+def spectrum_of(J: Float[np.ndarray, "m n"], above: Partial) -> Spectrum:
+    """Directions of a level that no buffer fades: all active."""
+    U, s, _ = np.linalg.svd(J @ above.Z)
+    return Spectrum(s**2, np.ones(s.size), U[:, : s.size])
+
+
 def _certified_regular(
     JN: Float[np.ndarray, "m r"],
     residual: Float[np.ndarray, " m"],

@@ -17,6 +17,7 @@ from opspace.law.singularity import (
     SigmaBuffer,
     Spectrum,
     solve_level_smoothly,
+    spectrum_of,
 )
 
 
@@ -112,7 +113,8 @@ class Walk:
         J, f = stack_rows(self._whitened, members)
         if self._buffer is None:
             partial = solve_level(J, f, above, compensate=self._compensate)
-            outcome = LevelOutcome([Alternative(1.0, partial)], None)
+            spectrum = spectrum_of(J, above) if self._want_spectra else None
+            outcome = LevelOutcome([Alternative(1.0, partial)], spectrum)
         else:
             outcome = solve_level_smoothly(
                 J, f, above, self._buffer, want_spectrum=self._want_spectra

@@ -115,7 +115,7 @@ def _with_robot_path(document: Document, directory: Path) -> Document:
 
 def _validated(document: Document) -> Scenario:
     try:
-        return Scenario.model_validate(document.data)
+        return Scenario.model_validate(document.data).read_from(document)
     except ValidationError as error:
         problems = [_located(details) for details in error.errors(include_url=False)]
     # The one that stands first in the file; those of overrides have no line and come last.

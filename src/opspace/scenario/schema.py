@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Annotated, Literal
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, PrivateAttr, field_validator, model_validator
 
+from opspace.errors import ScenarioError
+from opspace.scenario.document import Document, Key, key_text
 from opspace.scenario.fields import Checked, Entry, Quantity, problem, shown, whole
 from opspace.scenario.targets import Configuration
 from opspace.scenario.task_entries import AnyTask
@@ -13,21 +16,26 @@ from opspace.scenario.task_entries import AnyTask
 if TYPE_CHECKING:
     from typing_extensions import Self
 
-ProfileName = Literal["linear", "cubic", "quintic", "half-sine", "tanh"]
+ProfileName = Literal["linear", "cubic", "quintic", "half-sine", "tanh", "step"]
+"""``step`` is the hard switch that all of this avoids, for comparisons."""
 
 
 class Singularity(Entry):
-    """How directions that the robot is about to lose are faded out."""
+    """How directions that the robot is about to lose are faded out.
+
+    With the scale ``relative``, eigenvalues are multiples of the mean over the robot's workspace of
+    the diagonal of J M⁻¹ Jᵀ, separately for rows in m and in rad.
+    """
 
     lower: Annotated[float, Quantity("1", above=0.0)] = Field(
-        default=0.02, description="eigenvalue at and below which a direction is absent"
+        default=0.01, description="eigenvalue at and below which a direction is absent"
     )
     upper: Annotated[float, Quantity("1", above=0.0)] = Field(
-        default=0.1, description="eigenvalue at and above which a direction is fully active"
+        default=0.08, description="eigenvalue at and above which a direction is fully active"
     )
     scale: Literal["relative", "absolute"] = Field(
         default="relative",
-        description="relative to the eigenvalues at the start, or absolute [1/kg, 1/(kg·m²)]",
+        description="multiples of the mean over the workspace, or absolute [1/kg, 1/(kg·m²)]",
     )
     profile: ProfileName = Field(default="quintic", description="shape of the activation")
 
@@ -86,8 +94,17 @@ class Stop(Entry):
     )
 
 
+@dataclass(frozen=True)
+class Origin:
+    """Where a scenario was read from; it takes no part in comparisons."""
+
+    document: Document | None = field(default=None, compare=False)
+
+
 class Scenario(Entry):
     """One run: a robot, its tasks and how long."""
+
+    _origin: Origin = PrivateAttr(default=Origin())
 
     description: str = Field(default="", description="what the scenario shows")
     robot: str = Field(description="name of a robot, or path of a .urdf or .xml file")
@@ -109,7 +126,7 @@ class Scenario(Entry):
     )
     method: Literal["transition", "switch", "none"] = Field(
         default="transition",
-        description="activations fade, switch between 0 and 1, or are not used at all",
+        description="joint limits and singular directions fade, switch, or are not handled at all",
     )
     blending: Literal["idv", "chain"] = Field(
         default="idv", description="blend of simultaneous transitions: 2^k or k + 1 hard torques"
@@ -150,3 +167,23 @@ class Scenario(Entry):
         if self.dt > self.duration:
             raise problem(f"must not be longer than the duration, {self.duration:g} s", "dt")
         return self
+
+    def read_from(self, document: Document) -> Self:
+        """Remember the document that this was read from, for ``error``."""
+        self._origin = Origin(document)
+        return self
+
+    def error(self, key: Key, message: str) -> ScenarioError:
+        """Build the error about a key that turned out wrong when the scenario was used.
+
+        Args:
+            key: The offending key, for example ``("tasks", "position", "frame")``.
+            message: What is wrong and what would be right.
+
+        Returns:
+            The error, with file and line where the scenario came from a file.
+        """
+        document = self._origin.document
+        if document is None:
+            return ScenarioError(message, key=key_text(key))
+        return document.error(key, message)

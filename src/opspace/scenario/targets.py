@@ -121,6 +121,29 @@ class OutAndBack(Entry, Generic[OffsetT]):
     start_time: Seconds = Field(default=0.0, description="time at which it begins [s]")
 
 
+class Swing(Entry):
+    """Out on an arc about an axis, wait, and back to the start, each way with the least jerk."""
+
+    type: Literal["swing"] = Field(description="swing")
+    angle: Annotated[float, Quantity("rad")] = Field(
+        description="angle of the arc [rad], counter-clockwise about the axis"
+    )
+    center: Point = Field(description="a point on the axis [m]")
+    axis: Annotated[tuple[float, ...], Quantity("1", size=3)] = Field(
+        default=(0.0, 0.0, 1.0), description="direction of the axis"
+    )
+    out_duration: Duration = Field(description="time of the way out [s]")
+    hold_duration: Seconds = Field(default=0.0, description="time at the far end [s]")
+    back_duration: Duration = Field(description="time of the way back [s]")
+    start_time: Seconds = Field(default=0.0, description="time at which it begins [s]")
+
+    @model_validator(mode="after")
+    def _check_axis(self) -> Self:
+        if not any(self.axis):
+            raise problem("must not be zero", "axis")
+        return self
+
+
 class ViaPoints(Entry, Generic[GoalT, OffsetT]):
     """From the start through points at given times, at rest at both ends."""
 
@@ -189,7 +212,8 @@ PointTarget = Annotated[
     | Annotated[JerkLimited[Point, Point], Tag("<jerk_limited>")]
     | Annotated[OutAndBack[Point], Tag("<out_and_back>")]
     | Annotated[ViaPoints[Point, Point], Tag("<via_points>")]
-    | Annotated[Circle, Tag("<circle>")],
+    | Annotated[Circle, Tag("<circle>")]
+    | Annotated[Swing, Tag("<swing>")],
     _BY_TYPE,
 ]
 

@@ -4,6 +4,7 @@ from opspace.tasks.base import Task as Task
 from opspace.tasks.base import TaskTerms as TaskTerms
 from opspace.tasks.com import ComTask as ComTask
 from opspace.tasks.joint import JointTask as JointTask
+from opspace.tasks.joint_limits import JointLimits as JointLimits
 from opspace.tasks.orientation import OrientationTask as OrientationTask
 from opspace.tasks.pose import PoseTask as PoseTask
 from opspace.tasks.position import PositionTask as PositionTask

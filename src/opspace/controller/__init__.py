@@ -1,0 +1,9 @@
+"""The controller: one tick from state to torque."""
+
+from opspace.controller.calibration import Calibration as Calibration
+from opspace.controller.command import Command as Command
+from opspace.controller.command import LevelStatus as LevelStatus
+from opspace.controller.command import Status as Status
+from opspace.controller.command import TaskStatus as TaskStatus
+from opspace.controller.tick import Controller as Controller
+from opspace.controller.tick import Singularity as Singularity

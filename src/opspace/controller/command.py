@@ -1,0 +1,79 @@
+"""What one tick answers: the torque, and what a person wants to know about it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import IntFlag
+
+import numpy as np
+
+
+class Status(IntFlag):
+    """What happened in a tick; several may hold at once, 0 is an ordinary tick."""
+
+    OK = 0
+    DIRECTION_OFF = 1
+    """A singular direction is partly or fully deactivated."""
+    JOINT_LIMIT = 2
+    """A joint-limit task is partly or fully active."""
+    ABOVE_TORQUE_LIMIT = 4
+    """The command is above what the robot's motors give."""
+    FAULT = 8
+    """No finite torque was found; the command is gravity compensation with damping."""
+
+
+@dataclass(frozen=True, slots=True)
+class TaskStatus:
+    """One task in one tick.
+
+    Attributes:
+        activation: h of the task, 0 to 1.
+        error: (m,) x_d − x, in the units of the task's rows.
+        error_norm: Euclidean norm of ``error``.
+    """
+
+    activation: float
+    error: np.ndarray
+    error_norm: float
+
+
+@dataclass(frozen=True, slots=True)
+class LevelStatus:
+    """One level in one tick.
+
+    Attributes:
+        tasks: Names of its tasks.
+        sigma: (k,) eigenvalues of the projected inverse inertia of the level, Eq. 25, strongest
+            first; multiples of the tasks' reference values unless the buffer is absolute.
+        activation: (k,) activation of each direction.
+        directions: (m, k) the directions as columns, in the stacked rows of the tasks.
+    """
+
+    tasks: tuple[str, ...]
+    sigma: np.ndarray
+    activation: np.ndarray
+    directions: np.ndarray
+
+
+@dataclass(frozen=True, slots=True)
+class Command:
+    """The answer of one tick.
+
+    Attributes:
+        t: Time of the tick, s.
+        tau: (n,) joint torque, N·m, bias included; always finite.
+        status: What happened.
+        tasks: Status of each task by name.
+        levels: Status of each level, most important first; joint limits are not among them.
+        limits: Activation of the joint-limit tasks that are not at 0, by "joint/side".
+        hard_solves: Hard torques that entered the blend.
+    """
+
+    t: float
+    tau: np.ndarray
+    status: Status
+    tasks: Mapping[str, TaskStatus]
+    levels: tuple[LevelStatus, ...]
+    limits: Mapping[str, float]
+    hard_solves: int

@@ -1,0 +1,133 @@
+"""Joint-limit task sets of one tick: which are needed, and how much."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from opspace.law import Buffer, Profile, TaskSet
+from opspace.tasks import JointLimits
+
+TOP = -1
+"""Priority of joint limits: above every level of the stack."""
+
+
+@dataclass(frozen=True)
+class LimitTerms:
+    """One limit in one tick, with accelerations counted towards the limit.
+
+    Attributes:
+        name: "joint/side".
+        index: Velocity coordinate.
+        sign: +1 for an upper limit, −1 for a lower one.
+        command: Acceleration that the task set asks for, rad/s².
+        activation: Activation by position (mode ``buffer``); 0 in mode ``admissible``.
+        margin: Width of the activation's rise on a_other, rad/s²; 0 in mode ``buffer``.
+    """
+
+    name: str
+    index: int
+    sign: float
+    command: float
+    activation: float
+    margin: float
+
+
+def limit_terms(limits: JointLimits, positions: np.ndarray, v: np.ndarray) -> list[LimitTerms]:
+    """Evaluate every limit at the present state.
+
+    Args:
+        limits: The limits, bound to the robot.
+        positions: (n,) joint positions, rad.
+        v: (n,) joint velocities, rad/s.
+
+    Returns:
+        One entry per limit.
+    """
+    terms: list[LimitTerms] = []
+    for side in limits.sides:
+        position, speed = float(positions[side.index]), float(v[side.index])
+        if limits.mode == "buffer":
+            command, inner, outer = limits.pull_back(side, position, speed)
+            distance = side.sign * (side.limit - position)
+            h = Buffer(inner, outer, limits.profile)(distance).value
+            terms.append(LimitTerms(side.name, side.index, side.sign, command, h, 0.0))
+        else:
+            command = limits.admissible(side, position, speed)
+            margin = limits.margin(side)
+            terms.append(LimitTerms(side.name, side.index, side.sign, command, 0.0, margin))
+    return terms
+
+
+@dataclass(frozen=True)
+class Insertion:
+    """How one limit takes part in the stack.
+
+    Attributes:
+        activation: h of its task set.
+        desired: Acceleration towards the limit that the task set asks for, rad/s².
+    """
+
+    activation: float
+    desired: float
+
+
+def insertions(
+    terms: list[LimitTerms],
+    profile: str,
+    acceleration: np.ndarray,
+    known: Mapping[str, Insertion],
+) -> dict[str, Insertion]:
+    """Decide which limits take part, for the accelerations that the stack would now cause.
+
+    In mode ``admissible`` a limit asks for the smaller of what is admissible and what the joint does
+    anyway: while the second holds, inserting the task set changes nothing, so its activation can
+    rise before it is needed without pushing the joint anywhere. Neither activation nor desired value
+    fall below those known: a limit that works does not leave because it works. All of it is
+    continuous in the accelerations, hence so is the result of any fixed number of repetitions.
+
+    Args:
+        terms: Every limit.
+        profile: Name of the activation profile.
+        acceleration: (n,) joint accelerations under the stack with the insertions known so far.
+        known: Insertions so far, by name.
+
+    Returns:
+        The insertions with an activation above 0, by name.
+    """
+    shape = Profile(profile)
+    found: dict[str, Insertion] = {}
+    for term in terms:
+        if term.margin == 0.0:
+            insertion = Insertion(term.activation, term.command)
+        else:
+            before = known.get(term.name, Insertion(0.0, -np.inf))
+            a_other = float(term.sign * acceleration[term.index])
+            h = shape((a_other - (term.command - term.margin)) / term.margin).value
+            insertion = Insertion(
+                max(h, before.activation), max(min(a_other, term.command), before.desired)
+            )
+        if insertion.activation > 0.0:
+            found[term.name] = insertion
+    return found
+
+
+def limit_task_sets(
+    terms: list[LimitTerms], inserted: Mapping[str, Insertion], n: int, sigma_reference: float
+) -> list[TaskSet]:
+    """Build the task sets e_jᵀ q̈ = ± desired of the limits that take part."""
+    identity = np.eye(n)
+    return [
+        TaskSet(
+            identity[term.index : term.index + 1],
+            [term.sign * inserted[term.name].desired],
+            TOP,
+            inserted[term.name].activation,
+            term.name,
+            sigma_reference,
+        )
+        for term in terms
+        if term.name in inserted
+    ]

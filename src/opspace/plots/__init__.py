@@ -1,0 +1,14 @@
+"""Figures of recordings; the only place that uses matplotlib."""
+
+from opspace.errors import missing_extra
+
+try:
+    import matplotlib as matplotlib
+except ImportError:
+    raise missing_extra("matplotlib", "sim") from None
+
+from opspace.plots.columns import plot_columns as plot_columns
+from opspace.plots.joint_limit import joint_limit_figures as joint_limit_figures
+from opspace.plots.overview import overview_figure as overview_figure
+from opspace.plots.singularity import singularity_figures as singularity_figures
+from opspace.plots.style import save as save

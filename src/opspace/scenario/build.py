@@ -1,0 +1,138 @@
+"""Builds robot, stack, controller and plant from a scenario; nothing else does."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from opspace.controller import Controller, Singularity
+from opspace.errors import OpspaceError, UnknownNameError
+from opspace.robots import Robot, load_robot
+from opspace.scenario.build_tasks import build_tasks, check_configuration, configuration
+from opspace.scenario.schema import Scenario
+from opspace.sim import Plant, StopRule
+from opspace.stack import Stack
+from opspace.tasks import JointLimits, Task
+
+SWITCH = "step"
+"""Activation profile of the method ``switch``."""
+
+
+@dataclass(frozen=True)
+class Built:
+    """A scenario turned into objects, ready for `opspace.sim.simulate`.
+
+    Attributes:
+        scenario: What it was built from.
+        robot: The robot that the controller computes with.
+        stack: The tasks.
+        controller: The controller.
+        plant: The simulated robot at the start of the run.
+        stop: When the run is given up.
+    """
+
+    scenario: Scenario
+    robot: Robot
+    stack: Stack
+    controller: Controller
+    plant: Plant
+    stop: StopRule
+
+
+def build(scenario: Scenario) -> Built:
+    """Build what a scenario describes.
+
+    Args:
+        scenario: The scenario.
+
+    Returns:
+        The objects.
+
+    Raises:
+        ScenarioError: A name that the robot does not have, or a value that does not fit it.
+        ModelError: The robot's file cannot be used.
+        MissingExtraError: The robot or the simulator is not installed.
+    """
+    robot = build_robot(scenario)
+    q = _start(scenario, robot)
+    robot.update(q, np.zeros(robot.nv))
+    stack = Stack(_levels(scenario, robot))
+    try:
+        controller = Controller(
+            robot,
+            stack,
+            blending=scenario.blending,
+            bias=scenario.bias,
+            singularity=_singularity(scenario),
+        )
+    except UnknownNameError as error:
+        raise scenario.error(("joint_limits", "joints"), str(error)) from error
+    plant = Plant(
+        robot,
+        q,
+        dt=scenario.dt,
+        friction=scenario.plant.friction,
+        torque_limits=scenario.plant.torque_limits,
+    )
+    stop = StopRule(scenario.stop.max_joint_speed, scenario.stop.max_torque)
+    return Built(scenario, robot, stack, controller, plant, stop)
+
+
+def build_robot(scenario: Scenario) -> Robot:
+    """Load the robot of a scenario.
+
+    Args:
+        scenario: The scenario.
+
+    Returns:
+        The robot.
+
+    Raises:
+        ScenarioError: There is no robot of this name.
+        ModelError: The robot's file cannot be used.
+        MissingExtraError: The robot is not installed.
+    """
+    try:
+        return load_robot(
+            scenario.robot, backend=scenario.backend, floating_base=scenario.floating_base
+        )
+    except UnknownNameError as error:
+        raise scenario.error(("robot",), str(error)) from error
+
+
+def _start(scenario: Scenario, robot: Robot) -> np.ndarray:
+    try:
+        return check_configuration(configuration(scenario.start, robot), robot)
+    except OpspaceError as error:
+        raise scenario.error(("start",), str(error)) from error
+
+
+def _levels(scenario: Scenario, robot: Robot) -> list[JointLimits | list[Task]]:
+    tasks = build_tasks(scenario, robot)
+    by_level: dict[int, list[Task]] = {}
+    for name, entry in scenario.tasks.items():
+        by_level.setdefault(entry.level, []).append(tasks[name])
+    limits = _joint_limits(scenario)
+    return [*([limits] if limits else []), *(by_level[level] for level in sorted(by_level))]
+
+
+def _joint_limits(scenario: Scenario) -> JointLimits | None:
+    option = scenario.joint_limits
+    if option is None or scenario.method == "none":
+        return None
+    return JointLimits(
+        option.buffer,
+        mode=option.mode,
+        joints=option.joints,
+        brake_acceleration=option.brake_acceleration,
+        profile=SWITCH if scenario.method == "switch" else option.profile,
+    )
+
+
+def _singularity(scenario: Scenario) -> Singularity | None:
+    option = scenario.singularity
+    if option is None or scenario.method == "none":
+        return None
+    profile = SWITCH if scenario.method == "switch" else option.profile
+    return Singularity(option.lower, option.upper, option.scale, profile)

@@ -1,0 +1,112 @@
+"""Runs a scenario: recording, metrics and how it ended."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from opspace.record import Recording, load
+from opspace.record.format import write_json
+from opspace.record.observer import TickRecorder
+from opspace.scenario.build import Built, build
+from opspace.scenario.load import dump_scenario, to_dict
+from opspace.scenario.metrics import Metrics, measure
+from opspace.scenario.progress import ProgressBar
+from opspace.scenario.references import return_time
+from opspace.scenario.schema import Scenario
+from opspace.sim import Observer, Outcome, simulate
+
+METRICS = "metrics.json"
+SCENARIO = "scenario.yaml"
+
+
+@dataclass(frozen=True)
+class RunResult:
+    """What a run left behind.
+
+    Attributes:
+        directory: Recording, ``metrics.json`` and ``scenario.yaml`` lie here.
+        outcome: How the run ended.
+        recording: The recording.
+        metrics: The numbers of ``metrics.json``.
+    """
+
+    directory: Path
+    outcome: Outcome
+    recording: Recording
+    metrics: Metrics
+
+
+def run_scenario(
+    scenario: Scenario,
+    out: Path,
+    *,
+    title: str = "run",
+    progress: ProgressBar | None = None,
+    overwrite: bool = False,
+) -> RunResult:
+    """Simulate a scenario, record every tick and measure the run.
+
+    Args:
+        scenario: What to run.
+        out: Directory to write to.
+        title: What the progress bar calls it.
+        progress: Bar that gets a line for this run.
+        overwrite: Replace a recording that is already there.
+
+    Returns:
+        What the run left behind.
+
+    Raises:
+        ScenarioError: The scenario does not fit its robot.
+        RecordingError: There is a recording already, or the directory cannot be written.
+    """
+    built = build(scenario)
+    header = {"scenario": to_dict(scenario), "seed": scenario.seed, "dt": scenario.dt}
+    recorder = TickRecorder(out, built.controller, header, overwrite=overwrite)
+    (out / METRICS).unlink(missing_ok=True)
+    (out / SCENARIO).write_text(dump_scenario(scenario), encoding="utf-8")
+    line = progress.run(title, scenario.duration) if progress else None
+    outcome = _simulate(built, recorder, [line] if line else [])
+    if line:
+        line.finish(outcome.t)
+    recording = load(out)
+    metrics = measure(
+        recording,
+        limited_joint=limited_joint(scenario),
+        return_time=first_return(scenario),
+    )
+    write_json(out / METRICS, metrics.to_json())
+    return RunResult(out, outcome, recording, metrics)
+
+
+def limited_joint(scenario: Scenario) -> str | None:
+    """Name the joint that a scenario gives limits of its own, None where there is none."""
+    limits = scenario.joint_limits
+    return next(iter(limits.joints), None) if limits else None
+
+
+def first_return(scenario: Scenario) -> float | None:
+    """Time at which the first target begins to come back to its start [s], None without one."""
+    times = (return_time(getattr(task, "target", None)) for task in scenario.tasks.values())
+    return min((t for t in times if t is not None), default=None)
+
+
+def _simulate(built: Built, recorder: TickRecorder, watching: list[Observer]) -> Outcome:
+    """Run to the end and tell the recording how it came about, whatever happens."""
+    try:
+        outcome = simulate(
+            built.plant,
+            built.controller,
+            built.scenario.duration,
+            [recorder, *watching],
+            built.stop,
+        )
+    except KeyboardInterrupt:
+        recorder.close("interrupted")
+        raise
+    except BaseException as error:
+        recorder.close("crashed", f"{type(error).__name__}: {error}")
+        raise
+    recorder.close("completed" if outcome.completed else "stopped", outcome.reason)
+    return outcome

@@ -1,0 +1,62 @@
+"""Tables for a person."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from opspace.scenario.check import JointReport
+from opspace.scenario.metrics import UNITS, Metrics
+
+
+def metrics_table(runs: Mapping[str, Metrics]) -> tuple[list[str], list[list[str]]]:
+    """Write metrics, one column per run.
+
+    Args:
+        runs: Metrics by name of the run.
+
+    Returns:
+        Heads and rows; numbers that no run has are left out.
+    """
+    numbers = {name: metrics.to_json() for name, metrics in runs.items()}
+    rows = []
+    for key, unit in UNITS.items():
+        values = [found[key] for found in numbers.values()]
+        if any(value is not None for value in values):
+            rows.append(
+                [key.replace("_", " "), *map(_written, values), "" if unit == "1" else unit]
+            )
+    return ["", *numbers, "unit"], rows
+
+
+def joints_table(joints: Sequence[JointReport]) -> tuple[list[str], list[list[str]]]:
+    """Write what is known of joints, one row each.
+
+    Args:
+        joints: The joints.
+
+    Returns:
+        Heads with units, and rows.
+    """
+    heads = [
+        "joint",
+        "reference [rad]",
+        "lower [rad]",
+        "upper [rad]",
+        "speed [rad/s]",
+        "torque [N·m]",
+        "gravity [N·m]",
+        "brake [rad/s²]",
+    ]
+    rows = []
+    for j in joints:
+        numbers = (j.reference, j.lower, j.upper, j.max_velocity, j.max_torque, j.gravity, j.brake)
+        rows.append([j.name, *map(_written, numbers)])
+    return heads, rows
+
+
+def _written(value: bool | float | None) -> str:
+    if value is None:
+        return "-"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return f"{value:.3g}"

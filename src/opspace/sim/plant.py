@@ -1,0 +1,98 @@
+"""The simulated robot: MuJoCo, driven by joint torque."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from opspace.errors import InputError, ModelError, missing_extra
+
+if TYPE_CHECKING:
+    from opspace.robots.protocol import Robot
+
+
+class Plant:
+    """A robot in MuJoCo with nothing between the command and its joints but what is asked for.
+
+    Args:
+        robot: The robot whose file is simulated.
+        q: Configuration at the start, (nq,).
+        v: Velocity at the start, (n,), rad/s; zero where not given.
+        dt: Time step, s.
+        friction: Simulate the joint friction that the model has; the controller does not know it.
+        torque_limits: Saturate the torque at the robot's limits.
+
+    Raises:
+        MissingExtraError: MuJoCo is not installed.
+        ModelError: The robot has no file, or MuJoCo cannot simulate it.
+        InputError: The start state does not fit the robot.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        q: np.ndarray,
+        v: np.ndarray | None = None,
+        *,
+        dt: float = 0.001,
+        friction: bool = False,
+        torque_limits: bool = True,
+    ) -> None:
+        try:
+            import mujoco  # noqa: PLC0415 - an extra, and slow to import
+        except ImportError:
+            raise missing_extra("mujoco", "sim") from None
+        from opspace.robots.mujoco_model import mujoco_model  # noqa: PLC0415
+
+        if robot.source is None:
+            raise ModelError(f"robot {robot.name!r} has no file that a simulator could load")
+        self._mujoco = mujoco
+        self.model = mujoco_model(robot.source, robot.floating_base, robot.locked_joints)
+        self.model.opt.timestep = dt
+        # Implicit in the velocity: stable for stiff friction, exact for a frictionless arm to O(dt).
+        self.model.opt.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+        # Joint ranges are the controller's job, and a stop or a contact would hide its failures.
+        self.model.opt.disableflags |= (
+            mujoco.mjtDisableBit.mjDSBL_CONTACT | mujoco.mjtDisableBit.mjDSBL_LIMIT
+        )
+        self.model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_ACTUATION
+        if not friction:
+            self.model.dof_damping[:] = 0.0
+            self.model.dof_frictionloss[:] = 0.0
+        self._limit = robot.torque_limit if torque_limits else np.full(robot.nv, np.inf)
+        self.data = mujoco.MjData(self.model)
+        start = np.asarray(q, dtype=float)
+        if start.shape != (self.model.nq,) or not np.all(np.isfinite(start)):
+            raise InputError(
+                f"the start configuration of {robot.name!r} must be {self.model.nq} finite numbers"
+            )
+        self.data.qpos[:] = start
+        if v is not None:
+            self.data.qvel[:] = v
+        mujoco.mj_forward(self.model, self.data)
+        self.dt = dt
+
+    @property
+    def t(self) -> float:
+        """Simulated time, s."""
+        return float(self.data.time)
+
+    @property
+    def q(self) -> np.ndarray:
+        """Configuration, (nq,), a copy."""
+        return np.array(self.data.qpos)
+
+    @property
+    def v(self) -> np.ndarray:
+        """Velocity, (n,), rad/s, a copy."""
+        return np.array(self.data.qvel)
+
+    def advance(self, tau: np.ndarray) -> None:
+        """Hold a joint torque for one time step.
+
+        Args:
+            tau: (n,) N·m.
+        """
+        self.data.qfrc_applied[:] = np.clip(tau, -self._limit, self._limit)
+        self._mujoco.mj_step(self.model, self.data)

@@ -1,0 +1,192 @@
+"""Joint limits as task sets, one per joint and side, inserted only while they are needed."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from opspace.errors import InputError, unknown_name
+from opspace.tasks.validation import Array
+
+if TYPE_CHECKING:
+    from opspace.robots.protocol import Robot
+
+MODES = ("admissible", "buffer")
+"""``admissible``: active when the stack is about to ask for more than the joint can still brake.
+``buffer``: active by position near the limit, as in Section 4.2 of the paper."""
+
+RETURN_SPEED = 0.5
+"""Speed at which a joint that is outside its limits is brought back, rad/s or m/s."""
+
+
+@dataclass(frozen=True)
+class Side:
+    """One limit of one joint.
+
+    Attributes:
+        joint: Name of the joint.
+        index: Its velocity coordinate.
+        sign: +1 for the upper limit, −1 for the lower one.
+        limit: Position of the limit, rad or m.
+        brake: Acceleration with which the joint can be counted on to brake, rad/s² or m/s².
+    """
+
+    joint: str
+    index: int
+    sign: float
+    limit: float
+    brake: float
+
+    @property
+    def name(self) -> str:
+        """The side's name in diagnostics, for example ``joint1/upper``."""
+        return f"{self.joint}/{'upper' if self.sign > 0 else 'lower'}"
+
+
+class JointLimits:
+    r"""Keep joints inside their limits by task sets at the highest priority.
+
+    With d the distance to the limit, v the joint's speed towards it and a the braking acceleration,
+
+        v_adm(d) = k₁ d                    for 0 <= d <= a/k₁²
+                   √(2 a (d − a/2k₁²))     beyond            (constant braking; C¹ where they meet)
+                   −v_r tanh(k₁ |d| / v_r) outside the limit
+        q̈_adm = −v v_adm'(d) + k₂ (v_adm(d) − v)
+
+    is the largest acceleration towards the limit from which the joint still stops at it.
+
+    In mode ``admissible`` the task set is e_jᵀ q̈ = ± q̈_adm and its activation compares q̈_adm with
+    a_other, the acceleration of the joint under the stack without this task set:
+    h = profile((a_other − (q̈_adm − margin)) / margin). The joint's acceleration is then
+    (1 − h) a_other + h q̈_adm <= q̈_adm, so the whole range is usable and the limit only ever pushes
+    inwards.
+
+    In mode ``buffer`` the activation rises with the position, from 0 at the inner edge of the buffer to 1
+    at the limit (Section 4.2, Fig. 7), and the task set pulls back to the inner edge; a target at the limit
+    would hold the joint there for ever. The inner edge retreats by the braking distance v²/2a.
+
+    Args:
+        buffer: Width of the position buffer, rad or m; used in mode ``buffer``.
+        mode: One of `MODES`.
+        joints: Limits (lower, upper) by joint name that replace the robot's own, rad or m.
+        brake_acceleration: a, rad/s² or m/s²; None derives it per joint from the torque limits.
+        profile: Name of the activation profile.
+
+    Raises:
+        InputError: A number that cannot be used.
+        UnknownNameError: An unknown mode; at binding an unknown joint.
+    """
+
+    k1 = 10.0
+    k2 = 20.0
+    kp = 400.0
+
+    def __init__(
+        self,
+        buffer: float = 0.1,
+        *,
+        mode: str = "admissible",
+        joints: Mapping[str, Sequence[float]] | None = None,
+        brake_acceleration: float | None = None,
+        profile: str = "quintic",
+    ) -> None:
+        if mode not in MODES:
+            raise unknown_name("joint-limit mode", mode, MODES)
+        if not (math.isfinite(buffer) and buffer > 0.0):
+            raise InputError(f"joint limits: buffer must be above 0, got {buffer}")
+        if brake_acceleration is not None and not (
+            math.isfinite(brake_acceleration) and brake_acceleration > 0.0
+        ):
+            raise InputError(
+                f"joint limits: brake_acceleration must be above 0, got {brake_acceleration}"
+            )
+        self.buffer = float(buffer)
+        self.mode = mode
+        self.profile = profile
+        self.brake_acceleration = brake_acceleration
+        self._joints = {name: _pair(name, limits) for name, limits in (joints or {}).items()}
+        self.sides: tuple[Side, ...] = ()
+
+    def bind(self, robot: Robot, brake: Array) -> None:
+        """Find the limited joints of a robot.
+
+        Args:
+            robot: The robot.
+            brake: Braking acceleration of every joint, (n,), used where none was given.
+
+        Raises:
+            UnknownNameError: A joint that the robot does not have.
+        """
+        for name in self._joints:
+            if name not in robot.joint_names:
+                raise unknown_name("joint", name, robot.joint_names)
+        sides: list[Side] = []
+        for index, joint in enumerate(robot.joint_names):
+            own = (float(robot.q_lower[index]), float(robot.q_upper[index]))
+            limits = self._joints.get(joint, own)
+            a = float(brake[index]) if self.brake_acceleration is None else self.brake_acceleration
+            sides += [
+                Side(joint, index, sign, limit, a)
+                for sign, limit in zip((-1.0, 1.0), limits, strict=True)
+                if math.isfinite(limit)
+            ]
+        self.sides = tuple(sides)
+
+    def margin(self, side: Side) -> float:
+        """Width of the activation's rise on the acceleration, rad/s² or m/s²."""
+        return 0.75 * side.brake
+
+    def admissible(self, side: Side, position: float, speed: float) -> float:
+        """Largest acceleration towards a limit from which the joint still stops at it.
+
+        Args:
+            side: The limit.
+            position: Joint position, rad or m.
+            speed: Joint velocity (in the joint's own direction), rad/s or m/s.
+
+        Returns:
+            q̈_adm, measured towards the limit.
+        """
+        distance = side.sign * (side.limit - position)
+        towards = side.sign * speed
+        allowed, slope = self._allowed_speed(distance, side.brake)
+        return -towards * slope + self.k2 * (allowed - towards)
+
+    def _allowed_speed(self, d: float, a: float) -> tuple[float, float]:
+        if d < 0.0:
+            x = self.k1 * d / RETURN_SPEED
+            return RETURN_SPEED * math.tanh(x), self.k1 / math.cosh(min(-x, 300.0)) ** 2
+        knee = a / self.k1**2
+        if d <= knee:
+            return self.k1 * d, self.k1
+        v = math.sqrt(2.0 * a * (d - 0.5 * knee))
+        return v, a / v
+
+    def pull_back(self, side: Side, position: float, speed: float) -> tuple[float, float, float]:
+        """Mode ``buffer``: acceleration towards the limit, and the buffer's inner and outer edge.
+
+        Args:
+            side: The limit.
+            position: Joint position, rad or m.
+            speed: Joint velocity, rad/s or m/s.
+
+        Returns:
+            Commanded acceleration towards the limit (f* of Eq. 24 with the inner edge as target), and
+            the edges as distances from the limit, (inner, 0).
+        """
+        towards = side.sign * speed
+        inner = self.buffer + max(towards, 0.0) ** 2 / (2.0 * side.brake)
+        distance = side.sign * (side.limit - position)
+        command = self.kp * (distance - self.buffer) - 2.0 * math.sqrt(self.kp) * towards
+        return command, inner, 0.0
+
+
+def _pair(name: str, limits: Sequence[float]) -> tuple[float, float]:
+    values = np.asarray(limits, dtype=float)
+    if values.shape != (2,) or np.isnan(values).any() or not values[0] < values[1]:
+        raise InputError(f"joint limits of {name!r} must be (lower, upper), got {limits!r}")
+    return float(values[0]), float(values[1])

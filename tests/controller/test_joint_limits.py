@@ -1,0 +1,166 @@
+"""Joint limits: the guarantee, the law of insertion, and continuity."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from opspace.controller import Controller, Status
+from opspace.errors import InputError, UnknownNameError
+from opspace.robots import load_robot
+from opspace.stack import Stack
+from opspace.tasks import JointLimits, OrientationTask, PositionTask, PostureTask
+from opspace.tasks.joint_limits import Side
+
+SEEDS = st.integers(0, 2**32 - 1)
+DT = 0.001
+
+
+@pytest.fixture(scope="module")
+def robot():
+    return load_robot("puma560")
+
+
+@settings(max_examples=300)
+@given(
+    SEEDS, st.floats(2.0, 50.0), st.floats(0.0, 2.0), st.floats(0.0, 1.0), st.sampled_from([-1, 1])
+)
+def test_a_joint_that_obeys_never_passes_its_limit(seed, brake, room, fraction, sign):
+    """From any admissible start, whatever the rest of the stack asks for, at 1 kHz."""
+    rng = np.random.default_rng(seed)
+    side = Side("joint", 0, sign, 0.7, brake)
+    limits = JointLimits()
+    allowed, _ = limits._allowed_speed(room, brake)
+    q, v = 0.7 - sign * room, sign * fraction * allowed
+    wish = 0.0
+    hardest = 0.0
+    for tick in range(1500):
+        if tick % 50 == 0:
+            wish = rng.uniform(-300.0, 600.0)
+        admissible = limits.admissible(side, q, v)
+        a = sign * min(wish, admissible)
+        if sign * a < 0 and wish > 0:
+            hardest = max(hardest, -sign * a)
+        v += a * DT
+        q += v * DT
+        assert sign * (q - 0.7) <= 1e-9
+    assert hardest <= 1.1 * brake + 1e-9
+
+
+@settings(max_examples=300)
+@given(st.floats(-1.0, 3.0), st.floats(2.0, 50.0))
+def test_the_admissible_speed_is_once_differentiable_in_the_distance(distance, brake):
+    limits, d = JointLimits(), 1e-7
+    knee = brake / limits.k1**2
+    for x in (distance, 0.0, knee):
+        (below, s0), (here, slope), (above, s1) = (
+            limits._allowed_speed(x + k * d, brake) for k in (-1, 0, 1)
+        )
+        assert (above - below) / (2 * d) == pytest.approx(slope, abs=1e-3)
+        assert abs(s1 - s0) < 1e-2
+    assert limits._allowed_speed(0.0, brake)[0] == 0.0
+
+
+@settings(max_examples=300)
+@given(st.floats(-2.0, -1e-3))
+def test_outside_the_limit_only_the_way_back_is_admissible(distance):
+    allowed, _ = JointLimits()._allowed_speed(distance, 20.0)
+    assert -0.5 <= allowed < 0.0
+
+
+def controller_for(robot, limits):
+    stack = Stack([limits, OrientationTask(), PositionTask(), PostureTask()])
+    controller = Controller(robot, stack)
+    controller.step(0.0, robot.q_reference, np.zeros(6))
+    return controller
+
+
+def joint_acceleration(robot, q, v, tau):
+    robot.update(q, v)
+    return np.linalg.solve(robot.M, tau - robot.bias)
+
+
+@settings(max_examples=100, deadline=None)
+@given(SEEDS, st.floats(0.0, 0.2), st.floats(-1.0, 2.0))
+def test_the_joint_gets_the_smaller_of_wish_and_admissible(robot, seed, distance, speed):
+    rng = np.random.default_rng(seed)
+    q = robot.q_reference + rng.uniform(-0.2, 0.2, 6)
+    v = rng.uniform(-0.3, 0.3, 6)
+    v[0] = speed
+    joints = {"joint1": (-9.0, q[0] + distance)}
+    joints |= {f"joint{i}": (-9.0, 9.0) for i in range(2, 7)}
+    limits = JointLimits(joints=joints)
+    free = controller_for(robot, JointLimits(joints={f"joint{i}": (-9, 9) for i in range(1, 7)}))
+    limited = controller_for(robot, limits)
+    wish = joint_acceleration(robot, q, v, free.step(0.0, q, v).tau)[0]
+    command = limited.step(0.0, q, v)
+    got = joint_acceleration(robot, q, v, command.tau)[0]
+    side = next(s for s in limits.sides if s.name == "joint1/upper")
+    admissible = limits.admissible(side, q[0], v[0])
+    assert got == pytest.approx(min(wish, admissible), abs=1e-6 * (1 + abs(wish)))
+    if wish > admissible:
+        assert command.limits["joint1/upper"] == 1.0
+        assert command.status & Status.JOINT_LIMIT
+
+
+@pytest.mark.parametrize("mode", ["admissible", "buffer"])
+def test_torque_is_continuous_where_limits_come_and_go(robot, mode):
+    """Along a path through several limits, with speeds, ten times finer is ten times smoother."""
+    joints = {"joint1": (-0.3, 0.1), "joint2": (0.7, 1.05), "joint5": (-1.5, -1.15)}
+    controller = controller_for(robot, JointLimits(mode=mode, joints=joints))
+    rng = np.random.default_rng(4)
+    amplitude = rng.uniform(0.05, 0.2, 6)
+    phase = rng.uniform(0, 6, 6)
+
+    def steps(start, end, n):
+        path, active = [], set()
+        for s in np.linspace(start, end, n + 1):
+            q = robot.q_reference + amplitude * np.sin(3 * s + phase)
+            command = controller.step(0.0, q, 3 * amplitude * np.cos(3 * s + phase))
+            active |= set(command.limits)
+            path.append(command.tau)
+        return np.max(np.abs(np.diff(path, axis=0)), axis=1), active
+
+    coarse, active = steps(0.0, 2.0, 400)
+    assert len(active) >= 3
+    worst = int(np.argmax(coarse))
+    fine, _ = steps(2.0 * worst / 400, 2.0 * (worst + 1) / 400, 10)
+    assert np.max(fine) < 0.35 * coarse[worst]
+
+
+@pytest.mark.parametrize("sign", [-1, 1])
+def test_both_sides_are_mirror_images(sign):
+    limits = JointLimits()
+    upper = Side("j", 0, 1.0, 0.75, 20.0)
+    lower = Side("j", 0, -1.0, -0.75, 20.0)
+    assert limits.admissible(upper, 0.6 * sign, 0.3) == limits.admissible(lower, -0.6 * sign, -0.3)
+    assert limits.pull_back(upper, 0.6, 0.3) == limits.pull_back(lower, -0.6, -0.3)
+
+
+def test_pushed_together_every_joint_keeps_its_limit(robot):
+    """Holding one joint pushes others; after a few passes what is left is small beside the brake."""
+    q = robot.q_reference.copy()
+    joints = {f"joint{i + 1}": (q[i] - 0.01, q[i] + 0.01) for i in range(6)}
+    limits = JointLimits(joints=joints)
+    controller = controller_for(robot, limits)
+    task = next(t for t in controller.stack if t.name == "position")
+    robot.update(q, np.zeros(6))
+    task.target = robot.position(robot.frame_id("tool")) + [0.3, 0.2, 0.1]
+    command = controller.step(0.0, q, np.zeros(6))
+    got = joint_acceleration(robot, q, np.zeros(6), command.tau)
+    for side in limits.sides:
+        bound = limits.admissible(side, q[side.index], 0.0)
+        assert side.sign * got[side.index] <= bound + 1e-3 * side.brake, side.name
+
+
+def test_bad_limits_are_refused(robot):
+    with pytest.raises(UnknownNameError, match=r"mode 'bufer'.*buffer"):
+        JointLimits(mode="bufer")
+    with pytest.raises(InputError, match="buffer must be above 0"):
+        JointLimits(0.0)
+    with pytest.raises(InputError, match="brake_acceleration"):
+        JointLimits(brake_acceleration=-1.0)
+    with pytest.raises(InputError, match=r"joint limits of 'joint1' must be \(lower, upper\)"):
+        JointLimits(joints={"joint1": (1.0, 0.0)})
+    with pytest.raises(UnknownNameError, match=r"joint 'joint7'.*joint6"):
+        Controller(robot, Stack([JointLimits(joints={"joint7": (0.0, 1.0)})]))

@@ -1,0 +1,132 @@
+"""Every figure is there, is not blank, says what it shows and can be read."""
+
+import subprocess
+import sys
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+from matplotlib.image import imread
+
+from opspace.errors import InputError, UnknownNameError
+from opspace.plots import (
+    joint_limit_figures,
+    overview_figure,
+    plot_columns,
+    singularity_figures,
+)
+from opspace.plots.joint_limit import limit_figure
+from opspace.plots.overview import draw_overview
+from opspace.plots.singularity import activation_figure, joint_speed_figure, position_figure
+from opspace.plots.torque import torque_figure
+from tests.plots import inspection, synthetic
+
+BOTH = ("singularity", "joint limit")
+PICTURE = np.full((42, 48, 3), 128, dtype=np.uint8)
+
+FIGURES = {
+    "fig3": lambda s, j: joint_speed_figure(s),
+    "fig4": lambda s, j: activation_figure(s["transition"]),
+    "fig5": lambda s, j: position_figure(s["transition"]),
+    "fig7": lambda s, j: limit_figure(j),
+    "torque-singularity": lambda s, j: torque_figure(s),
+    "torque-joint-limit": lambda s, j: torque_figure(j),
+    "overview": lambda s, j: draw_overview({"singularity": s, "joint limit": j}, [PICTURE] * 2),
+    "overview-one": lambda s, j: draw_overview({"singularity": s}),
+    "columns": lambda s, j: plot_columns(s),
+    "columns-one": lambda s, j: plot_columns({"run": j["switch"]}, ["tau", "tool/x", "levels"]),
+}
+
+
+@pytest.fixture(params=FIGURES)
+def figure(request, singularity, joint_limit):
+    return FIGURES[request.param](singularity, joint_limit)
+
+
+def test_a_figure_can_be_read(figure):
+    assert inspection.unlabelled(figure) == []
+    assert inspection.overlaps(figure) == []
+    assert inspection.outside(figure) == []
+    assert all(axes.has_data() for axes in figure.axes)
+
+
+def test_files_are_written_and_not_blank(singularity, joint_limit, tmp_path):
+    paths = singularity_figures(singularity, tmp_path / "new")
+    paths += joint_limit_figures(joint_limit, tmp_path / "new")
+    paths.append(overview_figure({"both": singularity}, tmp_path / "overview.png"))
+    assert len(set(paths)) == 7
+    for path in paths:
+        image = imread(path)
+        assert inspection.contrast(image[..., :3]) > 0.05
+        assert image.shape[1] in (1350, 900)
+
+
+def test_the_same_runs_give_the_same_file(singularity, tmp_path):
+    paths = [overview_figure({"a": singularity}, tmp_path / f"{i}.png") for i in range(2)]
+    assert paths[0].read_bytes() == paths[1].read_bytes()
+
+
+def test_nothing_global_changes(singularity, joint_limit):
+    before = dict(mpl.rcParams)
+    for draw in FIGURES.values():
+        draw(singularity, joint_limit)
+    assert dict(mpl.rcParams) == before
+    code = "import sys, opspace.plots; sys.exit('matplotlib.pyplot' in sys.modules)"
+    subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def test_figures_show_the_runs_that_are_there(singularity, joint_limit, tmp_path):
+    without = {"without": singularity["without"]}
+    assert [path.stem for path in singularity_figures(without, tmp_path)] == [
+        "fig3-joint-speed",
+        "singularity-torque",
+    ]
+    assert len(joint_limit_figures({"transition": joint_limit["transition"]}, tmp_path)) == 2
+
+
+def test_an_unknown_variant_is_refused(singularity, tmp_path):
+    with pytest.raises(UnknownNameError, match=r"'transitions'.*did you mean 'transition'"):
+        singularity_figures({"transitions": singularity["switch"]}, tmp_path)
+
+
+@pytest.mark.parametrize("ticks", [0, 1])
+def test_a_run_that_is_too_short_is_refused(ticks, tmp_path):
+    run = synthetic.write(tmp_path / "run", {"t": np.zeros(ticks)})
+    for draw in (singularity_figures, joint_limit_figures):
+        with pytest.raises(InputError, match=f"{ticks} ticks"):
+            draw({"transition": run}, tmp_path)
+    with pytest.raises(InputError, match="no run"):
+        singularity_figures({}, tmp_path)
+
+
+def test_a_run_that_diverged_is_drawn(tmp_path):
+    t = np.linspace(0.0, 1.0, 50)
+    wild = np.where(t > 0.9, np.inf, 1.0)
+    values = {"t": t, "tau/joint1": wild, "v/joint2": np.where(t > 0.9, np.nan, 2.0)}
+    run = synthetic.write(tmp_path / "run", values, ended="stopped", reason="diverged")
+    assert len(singularity_figures({"without": run}, tmp_path)) == 2
+
+
+def test_points_of_the_activation_lie_on_the_curve_of_the_buffer(singularity):
+    panel = activation_figure(singularity["transition"]).axes[0]
+    points = next(line for line in panel.lines if line.get_marker() == "o")
+    expected = [synthetic.FADING(float(sigma)).value for sigma in points.get_xdata()]
+    assert np.allclose(points.get_ydata(), expected)
+    fading = (points.get_ydata() > 0.05) & (points.get_ydata() < 0.95)
+    assert fading.sum() >= 3
+
+
+def test_a_joint_keeps_its_colour(singularity, joint_limit):
+    colors = {
+        tuple(line.get_color() for line in axes.lines[:6])
+        for figure in (joint_speed_figure(singularity), torque_figure(joint_limit))
+        for axes in figure.axes[:2]
+    }
+    assert len(colors) == 1
+
+
+def test_columns_that_do_not_exist_are_refused(singularity):
+    with pytest.raises(UnknownNameError, match=r"'tua'.*did you mean.*'tau'"):
+        plot_columns(singularity, ["tua"])
+    with pytest.raises(InputError, match="no recording"):
+        plot_columns({})
