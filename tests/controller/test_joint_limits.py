@@ -53,7 +53,7 @@ def test_the_admissible_speed_is_once_differentiable_in_the_distance(distance, b
     limits, d = JointLimits(), 1e-7
     knee = brake / limits.k1**2
     for x in (distance, 0.0, knee):
-        (below, s0), (here, slope), (above, s1) = (
+        (below, s0), (_, slope), (above, s1) = (
             limits._allowed_speed(x + k * d, brake) for k in (-1, 0, 1)
         )
         assert (above - below) / (2 * d) == pytest.approx(slope, abs=1e-3)
@@ -80,7 +80,7 @@ def joint_acceleration(robot, q, v, tau):
     return np.linalg.solve(robot.M, tau - robot.bias)
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=40)
 @given(SEEDS, st.floats(0.0, 0.2), st.floats(-1.0, 2.0))
 def test_the_joint_gets_the_smaller_of_wish_and_admissible(robot, seed, distance, speed):
     rng = np.random.default_rng(seed)
@@ -121,10 +121,10 @@ def test_torque_is_continuous_where_limits_come_and_go(robot, mode):
             path.append(command.tau)
         return np.max(np.abs(np.diff(path, axis=0)), axis=1), active
 
-    coarse, active = steps(0.0, 2.0, 400)
+    coarse, active = steps(0.0, 2.0, 200)
     assert len(active) >= 3
     worst = int(np.argmax(coarse))
-    fine, _ = steps(2.0 * worst / 400, 2.0 * (worst + 1) / 400, 10)
+    fine, _ = steps(2.0 * worst / 200, 2.0 * (worst + 1) / 200, 10)
     assert np.max(fine) < 0.35 * coarse[worst]
 
 

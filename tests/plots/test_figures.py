@@ -21,7 +21,6 @@ from opspace.plots.singularity import activation_figure, joint_speed_figure, pos
 from opspace.plots.torque import torque_figure
 from tests.plots import inspection, synthetic
 
-BOTH = ("singularity", "joint limit")
 PICTURE = np.full((42, 48, 3), 128, dtype=np.uint8)
 
 FIGURES = {
@@ -68,8 +67,8 @@ def test_the_same_runs_give_the_same_file(singularity, tmp_path):
 
 def test_nothing_global_changes(singularity, joint_limit):
     before = dict(mpl.rcParams)
-    for draw in FIGURES.values():
-        draw(singularity, joint_limit)
+    for name in ("fig4", "fig7", "overview"):
+        FIGURES[name](singularity, joint_limit)
     assert dict(mpl.rcParams) == before
     code = "import sys, opspace.plots; sys.exit('matplotlib.pyplot' in sys.modules)"
     subprocess.run([sys.executable, "-c", code], check=True)
@@ -105,6 +104,14 @@ def test_a_run_that_diverged_is_drawn(tmp_path):
     values = {"t": t, "tau/joint1": wild, "v/joint2": np.where(t > 0.9, np.nan, 2.0)}
     run = synthetic.write(tmp_path / "run", values, ended="stopped", reason="diverged")
     assert len(singularity_figures({"without": run}, tmp_path)) == 2
+    draw_overview({"diverged": {"without": run}}).draw_without_rendering()
+
+
+def test_a_run_in_which_nothing_happens_is_drawn(tmp_path):
+    run = synthetic.write(tmp_path / "run", {"t": np.linspace(0.0, 1.0, 50)})
+    assert len(singularity_figures({"transition": run}, tmp_path)) == 4
+    assert len(joint_limit_figures({"transition": run}, tmp_path)) == 2
+    draw_overview({"rest": {"switch": run}}).draw_without_rendering()
 
 
 def test_points_of_the_activation_lie_on_the_curve_of_the_buffer(singularity):

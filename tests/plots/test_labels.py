@@ -37,7 +37,7 @@ def test_no_more_names_than_fit_and_the_liveliest_first():
     for line in lines:
         panel.plot(line.x, line.y)
     dress(panel, x="time [s]", y="value [1]")
-    label_ends(panel, lines)
+    label_ends({panel: lines})
     names = [text.get_text() for text in panel.texts]
     assert 3 <= len(names) < 15
     assert set(names) == {f"line{i}" for i in range(40 - len(names), 40)}
@@ -46,7 +46,7 @@ def test_no_more_names_than_fit_and_the_liveliest_first():
 
 def test_a_line_without_a_value_has_no_name():
     panel = new_figure(1.5).subplots()
-    label_ends(panel, [Line("nothing", line_color(0), np.arange(3.0), np.full(3, np.nan))])
+    label_ends({panel: [Line("nothing", line_color(0), np.arange(3.0), np.full(3, np.nan))]})
     assert not panel.texts
 
 
@@ -55,3 +55,4 @@ def test_numbers_have_two_digits_that_count_and_no_exponent(value):
     text = number(value)
     assert "e" not in text
     assert abs(float(text) - value) <= 0.0501 * value
+    assert len(text.replace(".", "").lstrip("0")) >= 2

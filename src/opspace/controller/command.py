@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from enum import IntFlag
+from enum import Flag, IntFlag
 
 import numpy as np
 
@@ -20,7 +20,9 @@ class Status(IntFlag):
     ABOVE_TORQUE_LIMIT = 4
     """The command is above what the robot's motors give."""
     FAULT = 8
-    """No finite torque was found; the command is gravity compensation with damping."""
+    """No finite torque was found; the command is bias compensation with damping."""
+
+    __str__ = Flag.__str__  # names rather than a number, also from Python 3.11 on
 
 
 @dataclass(frozen=True, slots=True)

@@ -87,7 +87,7 @@ class Controller:
         *,
         blending: str = "idv",
         bias: str = "joint",
-        singularity: Singularity | None = Singularity(),  # noqa: B008 - frozen
+        singularity: Singularity | None = Singularity(),
         damping: float = 10.0,
     ) -> None:
         if blending not in BLENDINGS:

@@ -85,8 +85,7 @@ def plot_columns(recordings: Mapping[str, Recording], columns: Sequence[str] = (
     times = np.concatenate([recording.t for recording in recordings.values()])
     panels[0, 0].set_xlim(times.min(), times.max())
     last = list(recordings.values())[-1]
-    for i, row in enumerate(rows):
-        label_ends(panels[i, -1], row.lines(last))
+    label_ends({panels[i, -1]: row.lines(last) for i, row in enumerate(rows)})
     return figure
 
 

@@ -50,20 +50,25 @@ def limit_figure(runs: Mapping[str, Recording]) -> Figure:
     """
     limit, figure = data.limited_joint(runs), style.new_figure(7.0)
     position, velocity, activation = figure.subplots(3, 1, sharex=True, height_ratios=[1.5, 1, 1])
-    for i, (name, run) in enumerate(runs.items()):
-        look = {"color": style.VARIANT_COLORS[name], "linewidth": 1.9, "zorder": 2.0 + 0.1 * i}
-        position.plot(run.t, run[f"q/{limit.joint}"], **look)
-        velocity.plot(run.t, run[f"v/{limit.joint}"], **look)
+    flips = ""
+    for name, run in runs.items():
+        look = style.overlaid(name)
+        position.plot(run.t, run[f"q/{limit.joint}"], linewidth=1.9, **look)
+        velocity.plot(run.t, run[f"v/{limit.joint}"], linewidth=1.9, **look)
         active = data.limit_activation(run, limit.joint)
-        if active is not None:
-            activation.plot(run.t, active, **look)
+        if active is not None and name != "without":
+            activation.plot(run.t, active, linewidth=1.9, **look)
+        if active is not None and name == "switch":
+            flips = f"; the hard switch flips {np.sum(np.abs(np.diff(active)) > 0.5)} times"
     _draw_limits(position, limit)
     activation.set(ylim=(-0.1, 1.15), yticks=[0.0, 0.5, 1.0])
     position.set_xlim(0.0, data.end_time(runs))
     unit = limit.unit
     style.dress(position, title=f"{limit.joint}: position", y=f"position [{unit}]")
     style.dress(velocity, title=f"{limit.joint}: velocity", y=f"velocity [{unit}/s]")
-    style.dress(activation, title="activation of its limit", x="time [s]", y="activation [1]")
+    style.dress(
+        activation, title=f"activation of its limit{flips}", x="time [s]", y="activation [1]"
+    )
     key_row(figure, [(data.title(n, r), style.VARIANT_COLORS[n]) for n, r in runs.items()])
     return figure
 

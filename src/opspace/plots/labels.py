@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -61,21 +61,25 @@ def mark_ends(axes: Axes, lines: Sequence[Line]) -> None:
         axes.plot(line.x[-1:], line.y[-1:], "x", color=line.color, markersize=6, zorder=4)
 
 
-def label_ends(axes: Axes, lines: Sequence[Line], size: float = SMALL) -> None:
+def label_ends(panels: Mapping[Axes, Sequence[Line]], size: float = SMALL) -> None:
     """Write the names of lines at their right ends, moved apart where they would overlap.
 
-    To be called when everything else is drawn, since it needs the height of the panel. Where there
-    are more lines than fit, those that move most get a name.
+    To be called when everything else is drawn, since it needs the heights of the panels. Where
+    there are more lines than fit, those that move most get a name.
 
     Args:
-        axes: Panel that shows the lines.
-        lines: The lines.
+        panels: The lines of each panel; the panels are of one figure.
         size: Font size in points.
     """
+    for axes, height in zip(panels, _heights(list(panels)), strict=True):
+        _label_panel(axes, panels[axes], size, height)
+
+
+def _label_panel(axes: Axes, lines: Sequence[Line], size: float, height: float) -> None:
     ended = [line for line in lines if np.isfinite(line.y).any()]
     if not ended:
         return
-    height, gap = _height(axes), size * LINE_HEIGHT
+    gap = size * LINE_HEIGHT
     room = max(int(height / gap), 1)
     chosen = sorted(sorted(range(len(ended)), key=lambda i: -_range(ended[i]))[:room])
     ends = {i: _end(axes, ended[i], height) for i in chosen}
@@ -117,7 +121,10 @@ def spread(wanted: np.ndarray, gap: float, low: float, high: float) -> np.ndarra
 
 def number(value: float) -> str:
     """Write a number with two digits that count and without an exponent."""
-    return np.format_float_positional(float(f"{value:.1e}"), trim="-")
+    if not (np.isfinite(value) and value):
+        return f"{value:g}"
+    rounded = float(f"{value:.1e}")
+    return f"{rounded:.{max(1 - int(np.floor(np.log10(abs(rounded)))), 0)}f}"
 
 
 def key_row(figure: Figure, entries: Iterable[tuple[str, str]]) -> None:
@@ -142,12 +149,13 @@ def key_row(figure: Figure, entries: Iterable[tuple[str, str]]) -> None:
         text.set_color(text_color(str(sample.get_color())))
 
 
-def _height(axes: Axes) -> float:
-    """Lay the figure out and return the height of a panel in points."""
-    figure = axes.get_figure(root=True)
-    assert figure is not None
+def _heights(panels: Sequence[Axes]) -> list[float]:
+    """Lay their figure out and return the heights of panels in points."""
+    figure = panels[0].get_figure(root=True) if panels else None
+    if figure is None:
+        return []
     figure.draw_without_rendering()
-    return float(axes.get_window_extent().height) * _POINTS_PER_INCH / figure.dpi
+    return [p.get_window_extent().height * _POINTS_PER_INCH / figure.dpi for p in panels]
 
 
 def _range(line: Line) -> float:

@@ -61,17 +61,18 @@ def draw_overview(
     for column, (title, runs) in enumerate(groups.items(), start=first):
         for row, (label, panels) in enumerate(rows.items()):
             panel = figure.add_subplot(grid[row, column], sharey=panels[0] if panels else None)
-            panel.set(xlim=(0.0, data.end_time(runs)), yscale="log")
+            panel.set(xlim=(0.0, data.end_time(runs)), yscale="log", ylim=_range(label, groups))
             style.dress(panel, title="" if row else title, x="time [s]" if row else "")
             panel.tick_params(labelbottom=row == 1, labelleft=not panels)
             panel.set_ylabel("" if panels else label)
             for name, run in runs.items():
                 _draw_run(panel, name, run, label)
             panels.append(panel)
+    peaks: dict[Axes, list[Line]] = {}
     for label, panels in rows.items():
-        panels[0].set_ylim(bottom=LOWEST[label])
         for panel, runs in zip(panels, groups.values(), strict=True):
-            label_ends(panel, [_peak(panel, name, run, label) for name, run in runs.items()])
+            peaks[panel] = [_peak(panel, name, run, label) for name, run in runs.items()]
+    label_ends(peaks)
     shown = dict.fromkeys(name for runs in groups.values() for name in runs)
     key_row(figure, [(style.VARIANT_TITLES[n], style.VARIANT_COLORS[n]) for n in shown])
     return figure
@@ -91,12 +92,18 @@ def _values(run: Recording, label: str) -> tuple[np.ndarray, np.ndarray]:
 
 def _draw_run(panel: Axes, variant: str, run: Recording, label: str) -> None:
     color, (t, values) = style.VARIANT_COLORS[variant], _values(run, label)
-    panel.plot(t, np.where(values > 0.0, values, np.nan), color=color, linewidth=1.3)
+    panel.plot(t, data.positive(values), linewidth=1.3, **style.overlaid(variant))
     if data.stopped(run):
         panel.plot(t[-1:], values[-1:], "x", color=color, markersize=8, mew=2.0, zorder=4)
 
 
+def _range(label: str, groups: Mapping[str, Mapping[str, Recording]]) -> tuple[float, float]:
+    runs = [run for group in groups.values() for run in group.values()]
+    peak = np.fmax.reduce([np.fmax.reduce(_values(run, label)[1]) for run in runs])
+    return LOWEST[label], 3.0 * float(np.fmax(peak, LOWEST[label]))
+
+
 def _peak(panel: Axes, variant: str, run: Recording, label: str) -> Line:
     """Return what writes the largest value at the right of a panel, at its height."""
-    x, y = np.array(panel.get_xlim()), np.full(2, np.nanmax(_values(run, label)[1]))
+    x, y = np.array(panel.get_xlim()), np.full(2, np.fmax.reduce(_values(run, label)[1]))
     return Line(f"max {number(y[0])}", style.VARIANT_COLORS[variant], x, y)

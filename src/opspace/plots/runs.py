@@ -123,8 +123,15 @@ def scales(runs: Mapping[str, Recording], group: str) -> dict[str, tuple[float, 
 
 
 def _reach(values: np.ndarray) -> tuple[float, float]:
-    low, high = float(np.nanmin(values)), float(np.nanmax(values))
-    return (low, high) if low < high else (low - 1.0, high + 1.0)
+    finite = values[np.isfinite(values)]
+    if not finite.size or finite.min() == finite.max():
+        return (-1.0, 1.0)
+    return float(finite.min()), float(finite.max())
+
+
+def _largest(values: np.ndarray) -> np.ndarray:
+    """Return the largest finite value of each row, NaN where there is none."""
+    return np.fmax.reduce(np.where(np.isfinite(values), values, np.nan), axis=1)
 
 
 def joint_lines(run: Recording, group: str) -> list[Line]:
@@ -163,12 +170,17 @@ def largest_step(run: Recording) -> np.ndarray:
     """Return the largest |Δtau| of any joint from each tick to the next, (T - 1,)."""
     # A diverged run ends with torques whose difference is not a number.
     with np.errstate(invalid="ignore"):
-        return np.abs(np.diff(run.group("tau"), axis=0)).max(axis=1)
+        return _largest(np.abs(np.diff(run.group("tau"), axis=0)))
+
+
+def positive(values: np.ndarray) -> np.ndarray:
+    """Return values with NaN where a logarithm has none."""
+    return np.where(values > 0.0, values, np.nan)
 
 
 def fastest(run: Recording) -> np.ndarray:
     """Return the largest joint speed at each tick, (T,)."""
-    return np.abs(run.group("v")).max(axis=1)
+    return _largest(np.abs(run.group("v")))
 
 
 def end_time(runs: Mapping[str, Recording]) -> float:

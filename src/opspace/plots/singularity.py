@@ -62,8 +62,7 @@ def joint_speed_figure(runs: Mapping[str, Recording]) -> Figure:
         draw_lines(panel, lines[name])
         if data.stopped(run):
             mark_ends(panel, lines[name])
-    for panel, name in zip(panels, shown, strict=True):
-        label_ends(panel, lines[name])
+    label_ends({panel: lines[name] for panel, name in zip(panels, shown, strict=True)})
     return figure
 
 
@@ -118,9 +117,9 @@ def position_figure(run: Recording, task: str = "position") -> Figure:
         position.plot(run.t, wanted[:, i], color=line.color, linewidth=1.3, linestyle=(0, (4, 2.5)))
     if direction is not None:
         lines[activation] = data.direction_lines(run.t, direction.activation)
-        lines[spectrum] = data.direction_lines(run.t, direction.sigma)
+        lines[spectrum] = data.direction_lines(run.t, data.positive(direction.sigma))
+        spectrum.set(yscale="log", ylim=_sigma_range(direction.sigma, edges))
         _shade_fading([position, activation, spectrum], run.t, direction)
-    spectrum.set_yscale("log")
     if edges:
         spectrum.axhspan(edges.lower, edges.upper, color=style.BAND, zorder=0)
         middle, t = (edges.lower * edges.upper) ** 0.5, 0.01 * float(run.t[-1])
@@ -135,8 +134,7 @@ def position_figure(run: Recording, task: str = "position") -> Figure:
     style.dress(spectrum, title="eigenvalues of the projected Λ⁻¹", x="time [s]", y=f"σ [{unit}]")
     for panel, drawn in lines.items():
         draw_lines(panel, drawn)
-    for panel, drawn in lines.items():
-        label_ends(panel, drawn)
+    label_ends(lines)
     return figure
 
 
@@ -159,6 +157,16 @@ def _shade_fading(panels: list[Axes], t: np.ndarray, direction: data.Direction) 
             panel.axvspan(
                 float(t[start]), float(t[stop - 1]), color=style.BAND, zorder=0, linewidth=0
             )
+
+
+def _sigma_range(sigma: np.ndarray, edges: data.SigmaEdges | None) -> tuple[float, float]:
+    """Return a range that shows the eigenvalues and the buffer, but not the way to an exact 0."""
+    shown = sigma[np.isfinite(sigma) & (sigma > 0.0)]
+    marks = np.append(shown, [edges.lower, edges.upper] if edges else [])
+    if not marks.size:
+        return 0.1, 1.0
+    floor = 0.05 * edges.lower if edges else 1e-6 * float(marks.max())
+    return 0.7 * max(float(marks.min()), floor), 1.5 * float(marks.max())
 
 
 def _write(panel: Axes, x: float, y: float, text: str, ha: str, color: str) -> None:

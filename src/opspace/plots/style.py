@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 from types import MappingProxyType
+from typing import Any
 
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -44,6 +45,13 @@ LINE_COLORS = (
     "#CBB34D",
     "#AA4499",
 )
+
+
+def overlaid(variant: str) -> dict[str, Any]:
+    """Return the look of a variant among others; a chattering switch must not hide them."""
+    order = ("switch", "without", "transition").index(variant)
+    alpha = 0.6 if variant == "switch" else 1.0
+    return {"color": VARIANT_COLORS[variant], "zorder": 2.0 + 0.1 * order, "alpha": alpha}
 
 
 def line_color(index: int) -> str:

@@ -34,23 +34,28 @@ def torque_figure(runs: Mapping[str, Recording]) -> Figure:
         draw_lines(torque, lines, 1.3)
         if data.stopped(run):
             mark_ends(torque, lines)
-        style.dress(step, title=f"largest step {number(np.nanmax(steps))} N·m", x="time [s]")
-        step.plot(run.t[1:], steps, color=style.VARIANT_COLORS[name], linewidth=1.1)
+        style.dress(step, title=f"largest step {number(np.fmax.reduce(steps))} N·m", x="time [s]")
         step.set(yscale="log", ylim=steps_scale, xlim=(0.0, end))
+        step.plot(run.t[1:], data.positive(steps), color=style.VARIANT_COLORS[name], linewidth=1.1)
     panels[0, 0].set_ylabel("joint torque [N·m]")
     panels[1, 0].set_ylabel("largest |Δτ| per tick [N·m]")
     for panel in panels[1, 1:]:
         panel.tick_params(labelleft=False)
-    for column, run in enumerate(runs.values()):
-        if data.stopped(run) or column == len(runs) - 1:
-            label_ends(panels[0, column], data.joint_lines(run, "tau"))
+    last = len(runs) - 1
+    label_ends(
+        {
+            panels[0, column]: data.joint_lines(run, "tau")
+            for column, run in enumerate(runs.values())
+            if data.stopped(run) or column == last
+        }
+    )
     return figure
 
 
 def _step_range(runs: Mapping[str, Recording]) -> tuple[float, float]:
     """Return a range of |Δtau| that shows every run and leaves out rounding."""
     steps = np.concatenate([data.largest_step(run) for run in runs.values()])
-    steps = steps[np.isfinite(steps) & (steps > 0.0)]
+    steps = steps[np.isfinite(data.positive(steps))]
     if not len(steps):
         return 1e-3, 1.0
     top = 2.0 * float(steps.max())

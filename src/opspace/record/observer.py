@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from opspace.controller import Command, Controller
-from opspace.record.format import Column
+from opspace.record.format import Column, Ended
 from opspace.record.writer import Recorder
 
 
@@ -104,7 +104,7 @@ class TickRecorder:
         parts.append([float(command.hard_solves), float(command.status)])
         self._recorder.append(np.concatenate(parts))
 
-    def close(self, how: str = "completed", reason: str = "") -> None:
+    def close(self, how: Ended = "completed", reason: str = "") -> None:
         """Finish the recording and say how the run ended."""
         self._recorder.close(how, reason)
 

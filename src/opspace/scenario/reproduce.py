@@ -139,7 +139,7 @@ def _pictures(done: Sequence[Reproduced]) -> tuple[list[np.ndarray], str]:
         run, scenario = found.runs[SHOWN], found.experiment.runs[SHOWN]
         robot, recording = build_robot(scenario), run.recording
         far, end = first_return(scenario) or 0.0, float(recording.t[-1])
-        times = [t for t in (0.0, 0.5 * far, far, 0.5 * (far + end), end) if t <= end]
+        times = [t for t in (0.0, 0.5 * far, far, end) if t <= end]
         try:
             snapshot_strip(recording, robot, times, found.directory / "snapshots.png")
             images += snapshots(recording, robot, [min(far, end)])

@@ -28,10 +28,10 @@ class Singularity(Entry):
     """
 
     lower: Annotated[float, Quantity("1", above=0.0)] = Field(
-        default=0.01, description="eigenvalue at and below which a direction is absent"
+        default=0.1, description="eigenvalue at and below which a direction is absent"
     )
     upper: Annotated[float, Quantity("1", above=0.0)] = Field(
-        default=0.08, description="eigenvalue at and above which a direction is fully active"
+        default=0.6, description="eigenvalue at and above which a direction is fully active"
     )
     scale: Literal["relative", "absolute"] = Field(
         default="relative",

@@ -65,7 +65,7 @@ def simulate(
     controller: Controller,
     duration: float,
     observers: Sequence[Observer] = (),
-    stop: StopRule = StopRule(),  # noqa: B008 - frozen
+    stop: StopRule = StopRule(),
 ) -> Outcome:
     """Run a controller on a plant; the same inputs give the same run, bit for bit.
 

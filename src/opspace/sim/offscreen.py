@@ -46,6 +46,19 @@ class View(NamedTuple):
     elevation: float
 
 
+def check_size(size: tuple[int, int]) -> None:
+    """Refuse a picture that has no pixels or more than any driver can hold.
+
+    Args:
+        size: Width and height in pixels.
+
+    Raises:
+        InputError: A side is too short or too long.
+    """
+    if not all(0 < side <= _LARGEST for side in size):
+        raise InputError(f"the size of a picture must be 1 to {_LARGEST} pixels, not {size}")
+
+
 def camera_axes(azimuth: float, elevation: float) -> np.ndarray:
     """Return right, up and forward of a camera as rows, (3, 3)."""
     a, e = np.radians([azimuth, elevation])
@@ -67,7 +80,11 @@ def fit_view(
 
     Returns:
         The camera.
+
+    Raises:
+        InputError: The size cannot be used.
     """
+    check_size(size)
     axes = camera_axes(*direction)
     points = points @ axes.T
     vertical = np.tan(np.radians(0.5 * fovy))
@@ -141,8 +158,7 @@ def canvas(model: mujoco.MjModel, size: tuple[int, int]) -> Iterator[Canvas]:
         SnapshotUnavailableError: There is no OpenGL to render with.
         InputError: The size cannot be used.
     """
-    if not all(0 < side <= _LARGEST for side in size):
-        raise InputError(f"the size of a picture must be 1 to {_LARGEST} pixels, not {size}")
+    check_size(size)
     model.vis.global_.offwidth, model.vis.global_.offheight = size
     gl, context = _open(model, size)
     try:

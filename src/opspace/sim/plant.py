@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -10,6 +10,14 @@ from opspace.errors import InputError, ModelError, missing_extra
 
 if TYPE_CHECKING:
     from opspace.robots.protocol import Robot
+
+
+def _import_mujoco() -> Any:
+    try:
+        import mujoco  # noqa: PLC0415 - an extra, and slow to import
+    except ImportError:
+        raise missing_extra("mujoco", "sim") from None
+    return mujoco
 
 
 class Plant:
@@ -39,11 +47,8 @@ class Plant:
         friction: bool = False,
         torque_limits: bool = True,
     ) -> None:
-        try:
-            import mujoco  # noqa: PLC0415 - an extra, and slow to import
-        except ImportError:
-            raise missing_extra("mujoco", "sim") from None
-        from opspace.robots.mujoco_model import mujoco_model  # noqa: PLC0415
+        mujoco = _import_mujoco()
+        from opspace.robots.mujoco_model import mujoco_model  # noqa: PLC0415 - imports mujoco
 
         if robot.source is None:
             raise ModelError(f"robot {robot.name!r} has no file that a simulator could load")
@@ -54,9 +59,10 @@ class Plant:
         self.model.opt.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
         # Joint ranges are the controller's job, and a stop or a contact would hide its failures.
         self.model.opt.disableflags |= (
-            mujoco.mjtDisableBit.mjDSBL_CONTACT | mujoco.mjtDisableBit.mjDSBL_LIMIT
+            mujoco.mjtDisableBit.mjDSBL_CONTACT
+            | mujoco.mjtDisableBit.mjDSBL_LIMIT
+            | mujoco.mjtDisableBit.mjDSBL_ACTUATION
         )
-        self.model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_ACTUATION
         if not friction:
             self.model.dof_damping[:] = 0.0
             self.model.dof_frictionloss[:] = 0.0

@@ -35,7 +35,7 @@ from opspace.robots.mujoco_model import mujoco_model
 __all__ = ["SnapshotUnavailableError", "snapshot_strip", "snapshots"]
 
 SIZE = (480, 420)
-TARGET_COLOR = (0.87, 0.25, 0.20, 1.0)
+TARGET_COLOR = (0.87, 0.18, 0.14, 0.75)
 TRAIL_COLOR = (0.0, 0.27, 0.53, 1.0)
 
 # From the front and a little from above, where the light comes from; then all around.
@@ -222,4 +222,4 @@ def _draw(drawing: Canvas, data: mujoco.MjData, tick: _Tick, view: View) -> None
         mujoco.mjv_connector(geom, shape, radius, start, end)
     if tick.target is not None:
         shape = mujoco.mjtGeom.mjGEOM_SPHERE
-        drawing.add(shape, tick.target, 0.014 * view.distance, TARGET_COLOR)
+        drawing.add(shape, tick.target, 0.012 * view.distance, TARGET_COLOR)

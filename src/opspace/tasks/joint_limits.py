@@ -59,15 +59,16 @@ class JointLimits:
 
     is the largest acceleration towards the limit from which the joint still stops at it.
 
-    In mode ``admissible`` the task set is e_jᵀ q̈ = ± q̈_adm and its activation compares q̈_adm with
-    a_other, the acceleration of the joint under the stack without this task set:
-    h = profile((a_other − (q̈_adm − margin)) / margin). The joint's acceleration is then
-    (1 − h) a_other + h q̈_adm <= q̈_adm, so the whole range is usable and the limit only ever pushes
-    inwards.
+    In mode ``admissible`` a joint gets the smaller of q̈_adm and a_other, its acceleration under
+    the stack without this limit: the task set asks for min(a_other, q̈_adm), with the activation
+    h = profile((a_other − (q̈_adm − margin)) / margin). While a_other is the smaller, inserting a
+    task set that asks for what happens anyway changes nothing, so the torque is continuous, the
+    whole range is usable, and the limit only ever pushes inwards and lets go by itself.
 
-    In mode ``buffer`` the activation rises with the position, from 0 at the inner edge of the buffer to 1
-    at the limit (Section 4.2, Fig. 7), and the task set pulls back to the inner edge; a target at the limit
-    would hold the joint there for ever. The inner edge retreats by the braking distance v²/2a.
+    In mode ``buffer`` the activation rises with the position, from 0 at the inner edge of the buffer
+    to 1 at the limit (Section 4.2, Fig. 7), and the task set pulls back to the inner edge; a target
+    at the limit would hold the joint there for ever. The inner edge retreats by the braking
+    distance v²/2a.
 
     Args:
         buffer: Width of the position buffer, rad or m; used in mode ``buffer``.
