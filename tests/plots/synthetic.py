@@ -69,7 +69,7 @@ def write(directory, values, *, header=None, ended="completed", reason=""):
     return load(directory)
 
 
-def experiment(directory, name, dt=0.01):
+def experiment(directory, name, dt=0.02):
     """The three variants of ``singularity`` or ``joint-limit``."""
     return {
         variant: write_run(directory / variant, name, variant, dt)

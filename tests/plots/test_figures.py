@@ -74,6 +74,20 @@ def test_nothing_global_changes(singularity, joint_limit):
     subprocess.run([sys.executable, "-c", code], check=True)
 
 
+@pytest.mark.parametrize(
+    ("package", "module"),
+    [("matplotlib", "plots"), ("mujoco", "sim.snapshots"), ("PIL", "sim.snapshots")],
+)
+def test_a_missing_package_is_named_with_its_extra(package, module):
+    code = (
+        f"import sys\nsys.modules[{package!r}] = None\n"
+        "from opspace.errors import MissingExtraError\n"
+        f"try:\n    import opspace.{module}\nexcept MissingExtraError as error: print(error)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert "pip install 'opspace[sim]'" in done.stdout
+
+
 def test_figures_show_the_runs_that_are_there(singularity, joint_limit, tmp_path):
     without = {"without": singularity["without"]}
     assert [path.stem for path in singularity_figures(without, tmp_path)] == [

@@ -125,9 +125,8 @@ POSITION_TARGETS = {
 }
 
 
-def references():
-    """Every kind of reference as a task gets it, at home."""
-    ROBOT.update(HOME, np.zeros(6))
+def entries():
+    """A task for every kind of reference."""
     turn = {"type": "out_and_back", "offset": [0.5, -0.5, 1.0], **GONE}
     tasks = {
         name: {"type": "position", "level": 0, "target": {"type": name, **target}}
@@ -147,17 +146,25 @@ def references():
         "joints": ["joint2", "joint1"],
         "target": {"type": "minimum_jerk", "goal": "vertical", "duration": 1.0},
     }
-    return build_tasks(short(tasks=tasks), ROBOT)
+    return tasks
 
 
-BUILT = references()
+ENTRIES = entries()
+
+
+def task_at_home(name, **entry):
+    """A task as it is built, the robot at home."""
+    ROBOT.update(HOME, np.zeros(6))
+    tasks = {name: entry or ENTRIES[name]}
+    return build_tasks(short(tasks=tasks), ROBOT)[name]
+
+
 RETURNING = ("out_and_back", "swing", "turn", "com", "away")
 
 
-@pytest.mark.parametrize("name", BUILT)
+@pytest.mark.parametrize("name", ENTRIES)
 def test_every_reference_begins_where_the_robot_is(name):
-    task = BUILT[name]
-    ROBOT.update(HOME, np.zeros(6))
+    task = task_at_home(name)
     terms = task.evaluate(ROBOT, 0.0)
     np.testing.assert_allclose(terms.error, 0.0, atol=1e-12)
     sample = task.target(0.0)
@@ -166,7 +173,7 @@ def test_every_reference_begins_where_the_robot_is(name):
 
 @pytest.mark.parametrize("name", RETURNING)
 def test_what_goes_out_comes_back(name):
-    target = BUILT[name].target
+    target = task_at_home(name).target
     np.testing.assert_allclose(target(5.0).x, target(0.0).x, atol=1e-12)
     assert np.abs(target(0.45).x - target(0.0).x).max() > 0.05
     np.testing.assert_allclose(target(0.45).v, 0.0, atol=1e-12)
@@ -174,7 +181,7 @@ def test_what_goes_out_comes_back(name):
 
 @given(st.floats(0.0, 1.0))
 def test_a_swing_keeps_its_distance_and_tells_its_rates(t):
-    swing, axis = BUILT["swing"].target, np.array([0.0, 0.6, 0.8])
+    swing, axis = task_at_home("swing").target, np.array([0.0, 0.6, 0.8])
     center, step = np.array([0.0, 0.0, 0.5]), 1e-5
     x, start = swing(t).x - center, swing(0.0).x - center
     assert np.isclose(np.linalg.norm(x), np.linalg.norm(start))
@@ -187,16 +194,14 @@ def test_a_swing_keeps_its_distance_and_tells_its_rates(t):
 
 
 def test_a_swing_turns_by_its_angle():
-    swing = {"angle": np.pi / 2, "center": [0.0, 0.0, 0.0], **GONE}
-    tasks = {"p": {"type": "position", "level": 0, "target": {"type": "swing", **swing}}}
-    ROBOT.update(HOME, np.zeros(6))
-    target = build_tasks(short(tasks=tasks), ROBOT)["p"].target
+    swing = {"type": "swing", "angle": np.pi / 2, "center": [0.0, 0.0, 0.0], **GONE}
+    target = task_at_home("quarter", type="position", level=0, target=swing).target
     (x, y, z), far = target(0.0).x, target(0.45).x
     np.testing.assert_allclose(far, [-y, x, z], atol=1e-12)
 
 
 def test_a_circle_passes_through_the_start_at_its_radius():
-    circle, normal = BUILT["circle"].target, np.array([0.0, 1.0, 0.2])
+    circle, normal = task_at_home("circle").target, np.array([0.0, 1.0, 0.2])
     start = circle(0.0).x
     points = np.array([circle(t).x for t in np.linspace(0.0, 3.0, 200)])
     assert np.allclose((points - start) @ normal, 0.0)
@@ -225,9 +230,12 @@ def refused(tmp_path, key, value):
     error = raised.value
     assert str(error).startswith(f"{path}:{error.line}: ")
     assert "\n" not in str(error)
-    assert any(before != after and error.line == i for i, (before, after) in enumerate(
-        zip(text.splitlines(), changed.splitlines(), strict=True), 1
-    ))
+    assert any(
+        before != after and error.line == i
+        for i, (before, after) in enumerate(
+            zip(text.splitlines(), changed.splitlines(), strict=True), 1
+        )
+    )
     return error
 
 

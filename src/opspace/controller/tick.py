@@ -18,7 +18,16 @@ from opspace.controller.joint_limits import (
     limit_terms,
 )
 from opspace.errors import InputError, unknown_name
-from opspace.law import BLENDINGS, LawInfo, SigmaBuffer, TaskSet, task_torque
+from opspace.law import (
+    BLENDINGS,
+    LawInfo,
+    SigmaBuffer,
+    TaskSet,
+    Weighted,
+    blended_torque,
+    combined,
+    corners,
+)
 from opspace.robots.protocol import Robot
 from opspace.stack import Stack
 from opspace.tasks import JointTask, PostureTask, TaskTerms
@@ -69,7 +78,8 @@ class Controller:
     Args:
         robot: The robot; the controller updates it at every tick.
         stack: The tasks.
-        blending: ``"idv"`` or ``"chain"``, see `opspace.task_torque`.
+        blending: ``"idv"`` or ``"chain"`` for the tasks, see `opspace.task_torque`; joint limits,
+            of which many may act at once, are always blended by the chain.
         bias: ``"joint"`` (default) or ``"task"``, see `BIASES`.
         singularity: Buffer for singular directions; None switches their handling off.
         damping: Joint damping in the motions that no task uses, 1/s; also what a joint is braked
@@ -175,7 +185,8 @@ class Controller:
 
     def _torque(self, tasks: list[TaskSet]) -> tuple[np.ndarray, LawInfo, dict[str, float]]:
         """The law (Eq. 19-23), with the joint limits that its own answer calls for."""
-        tau, info = self._law(tasks)
+        L = np.linalg.cholesky(self.robot.M)
+        tau, info = self._law(L, [], tasks)
         limits = self.stack.limits
         if limits is None:
             return tau, info, {}
@@ -189,17 +200,30 @@ class Controller:
                 break
             inserted = again
             sets = limit_task_sets(terms, inserted, robot.nv, self._joint_reference)
-            tau, info = self._law([*sets, *tasks])
+            tau, info = self._law(L, sets, tasks)
         return tau, info, {name: limit.activation for name, limit in inserted.items()}
 
-    def _law(self, tasks: list[TaskSet]) -> tuple[np.ndarray, LawInfo]:
-        """Joint torque of a list of task sets, bias included as the option says."""
+    def _law(
+        self, L: np.ndarray, limits: list[TaskSet], tasks: list[TaskSet]
+    ) -> tuple[np.ndarray, LawInfo]:
+        """Joint torque of limits and tasks, bias included as the option says."""
         robot = self.robot
+        sets = [*limits, *tasks]
         if self.bias == "task":
             # Eq. 3-4: f̃ = f* + η + ζ, the bias as an acceleration of each task.
             drop = np.linalg.solve(robot.M, robot.bias)
-            tasks = [task.replace(f=task.f + task.J @ drop) for task in tasks]
-        tau, info = task_torque(robot.M, tasks, self.blending, singular=self._buffer, info=True)
+            sets = [task.replace(f=task.f + task.J @ drop) for task in sets]
+        # Many joints can be near a limit at once: k + 1 corners for them, not 2^k.
+        activations = [task.activation for task in sets]
+        first = len(limits)
+        blend = combined(
+            corners(activations[:first], "chain"),
+            [
+                Weighted(w, frozenset(first + k for k in present))
+                for w, present in corners(activations[first:], self.blending)
+            ],
+        )
+        tau, info = blended_torque(L, sets, blend, self._buffer, want_spectra=True)
         return (tau if self.bias == "task" else tau + robot.bias), info
 
     def _acceleration(self, tau: np.ndarray) -> np.ndarray:

@@ -1,10 +1,10 @@
 """The mathematics of continuous task transitions: arrays in, arrays out, no robot."""
 
 from opspace.law.activation import PROFILES, Activation, Buffer, Profile, Ramp
-from opspace.law.blending import BLENDINGS
+from opspace.law.blending import BLENDINGS, Weighted, combined, corners
 from opspace.law.singularity import SigmaBuffer
 from opspace.law.tasksets import TaskSet
-from opspace.law.torque import COUPLINGS, LawInfo, intermediate_values, task_torque
+from opspace.law.torque import COUPLINGS, LawInfo, blended_torque, intermediate_values, task_torque
 
 __all__ = [
     "BLENDINGS",
@@ -17,6 +17,10 @@ __all__ = [
     "Ramp",
     "SigmaBuffer",
     "TaskSet",
+    "Weighted",
+    "blended_torque",
+    "combined",
+    "corners",
     "intermediate_values",
     "task_torque",
 ]

@@ -49,6 +49,15 @@ def corners(activations: Sequence[float], blending: str) -> list[Weighted]:
     return _chain_corners(activations, always, moving)
 
 
+def combined(first: Sequence[Weighted], second: Sequence[Weighted]) -> list[Weighted]:
+    """Combine the blends of two disjoint groups of task sets, each blended in its own way.
+
+    The weights multiply, as if the groups were independent; continuity and the marginals of either
+    are kept, and so are the values at the corners.
+    """
+    return [Weighted(a.weight * b.weight, a.present | b.present) for a in first for b in second]
+
+
 def _idv_corners(h: Sequence[float], always: frozenset[int], moving: list[int]) -> list[Weighted]:
     """Multilinear interpolation: Π_{k∈T} h_k Π_{k∉T} (1 − h_k) for every subset T."""
     result: list[Weighted] = []

@@ -110,32 +110,46 @@ def task_torque(
     if coupling not in COUPLINGS:
         raise unknown_name("coupling", coupling, COUPLINGS)
     if coupling == "as-printed":
-        u, found = _as_printed(tasks, L, blending, singular)
-    else:
-        u, found = _compensated(tasks, L, blending, singular, want_spectra=info)
-    tau = L @ u
-    return (tau, found) if info else tau
-
-
-def _compensated(
-    tasks: Sequence[TaskSet],
-    L: Float[np.ndarray, "n n"],
-    blending: str,
-    singular: SigmaBuffer | None,
-    *,
-    want_spectra: bool,
-) -> tuple[Float[np.ndarray, " n"], LawInfo]:
+        tau, found = _as_printed(tasks, L, blending, singular)
+        return (tau, found) if info else tau
     # Left out before any arithmetic, so that "out" is the same stack to the last bit.
     where = [k for k, task in enumerate(tasks) if task.activation > 0.0]
     present = [tasks[k] for k in where]
     blend = corners([task.activation for task in present], blending)
-    walk = Walk(whiten(present, L), levels_of(present), buffer=singular, want_spectra=want_spectra)
-    u = walk.torque(blend, L.shape[0])
+    tau, found = blended_torque(L, present, blend, singular, want_spectra=info)
+    if not info:
+        return tau
     levels = tuple(
         LevelReport(r.priority, tuple(where[k] for k in r.members), r.weight, r.spectrum)
-        for _, r in sorted(walk.report.levels.items())
+        for r in found.levels
     )
-    return u, LawInfo(walk.report.hard_solves, walk.report.level_solves, levels)
+    return tau, LawInfo(found.hard_solves, found.level_solves, levels)
+
+
+def blended_torque(
+    L: Float[np.ndarray, "n n"],
+    tasks: Sequence[TaskSet],
+    blend: Sequence[Weighted],
+    singular: SigmaBuffer | None = None,
+    *,
+    want_spectra: bool = False,
+) -> tuple[Float[np.ndarray, " n"], LawInfo]:
+    """Compute Σ_T w_T H(T; f̃) for corners T that the caller has chosen.
+
+    Args:
+        L: Lower Cholesky factor of the inertia, shape (n, n).
+        tasks: Every task set that is in some corner; their activations are not looked at.
+        blend: Corners, as indices into ``tasks``, with weights that sum to 1.
+        singular: Buffer for singular directions, or None.
+        want_spectra: Report the directions of every level.
+
+    Returns:
+        Torque Γ, shape (n,), N·m, and what it took.
+    """
+    walk = Walk(whiten(tasks, L), levels_of(tasks), buffer=singular, want_spectra=want_spectra)
+    tau = L @ walk.torque(blend, L.shape[0])
+    levels = tuple(walk.report.levels[p] for p in sorted(walk.report.levels))
+    return tau, LawInfo(walk.report.hard_solves, walk.report.level_solves, levels)
 
 
 def _as_printed(
@@ -156,7 +170,7 @@ def _as_printed(
         whiten(tasks, L), levels, [task.activation for task in tasks], L.shape[0], compensate=False
     )
     u = recursion.command(frozenset(range(len(tasks))))
-    return u, LawInfo(recursion.solves, recursion.solves * len(levels), ())
+    return L @ u, LawInfo(recursion.solves, recursion.solves * len(levels), ())
 
 
 Controller = Callable[[Sequence[TaskSet]], ArrayLike]

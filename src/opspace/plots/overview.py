@@ -73,9 +73,19 @@ def draw_overview(
         for panel, runs in zip(panels, groups.values(), strict=True):
             peaks[panel] = [_peak(panel, name, run, label) for name, run in runs.items()]
     label_ends(peaks)
-    shown = dict.fromkeys(name for runs in groups.values() for name in runs)
-    key_row(figure, [(style.VARIANT_TITLES[n], style.VARIANT_COLORS[n]) for n in shown])
+    key_row(figure, _key(groups))
     return figure
+
+
+def _key(groups: Mapping[str, Mapping[str, Recording]]) -> list[tuple[str, str]]:
+    """Return name and colour of each variant, and what a cross means."""
+    stopped: dict[str, bool] = {}
+    for name, run in (item for runs in groups.values() for item in runs.items()):
+        stopped[name] = stopped.get(name, False) or data.stopped(run)
+    return [
+        (style.VARIANT_TITLES[n] + (" (×: stopped)" if s else ""), style.VARIANT_COLORS[n])
+        for n, s in stopped.items()
+    ]
 
 
 def _draw_images(figure: Figure, place: SubplotSpec, images: Sequence[np.ndarray]) -> None:
