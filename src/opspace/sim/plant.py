@@ -62,6 +62,8 @@ class Plant:
             mujoco.mjtDisableBit.mjDSBL_CONTACT
             | mujoco.mjtDisableBit.mjDSBL_LIMIT
             | mujoco.mjtDisableBit.mjDSBL_ACTUATION
+            # A run that diverges must be seen to diverge, not start again from the beginning.
+            | mujoco.mjtDisableBit.mjDSBL_AUTORESET
         )
         if not friction:
             self.model.dof_damping[:] = 0.0
@@ -75,7 +77,12 @@ class Plant:
             )
         self.data.qpos[:] = start
         if v is not None:
-            self.data.qvel[:] = v
+            speed = np.asarray(v, dtype=float)
+            if speed.shape != (self.model.nv,) or not np.all(np.isfinite(speed)):
+                raise InputError(
+                    f"the start velocity of {robot.name!r} must be {self.model.nv} finite numbers"
+                )
+            self.data.qvel[:] = speed
         mujoco.mj_forward(self.model, self.data)
         self.dt = dt
 
