@@ -219,7 +219,7 @@ def check(
     for task, sigma in report.sigma.items():
         values = ", ".join(f"{value:.3g}" for value in sigma)
         print(f"\n{task}: eigenvalues {values} at the reference posture", end="")
-        print(f" (1 is the mean over the workspace, {report.scale[task]:.3g} {_UNITS[task]})")
+        print(f" (1 is what is usual in the workspace, {report.scale[task]:.3g} {_UNITS[task]})")
     lower, upper = report.buffer
     print(f"\nbuffer: a direction is absent below {lower:g} and fully active above {upper:g}")
     for warning in report.warnings:

@@ -9,7 +9,7 @@ from opspace.errors import InputError, UnknownNameError
 from opspace.law import PROFILES, Buffer, Profile, Ramp
 
 MANY = settings(max_examples=300)
-UNIT = st.floats(0.001, 0.999)
+UNIT = st.floats(0.005, 0.995)
 SMOOTH = [name for name in PROFILES if name != "step"]
 
 
@@ -22,7 +22,7 @@ def test_profiles_rise_from_zero_to_one(name):
     assert np.all(np.diff(values) >= 0)
     if name != "step":
         assert profile(0.5).value == pytest.approx(0.5, abs=1e-12)
-    for outside in (-1.0, 0.0, 1.0, 2.0):
+    for outside in (-1.0, 0.0, 1.0, 2.0, -5e-324):
         assert profile(outside)[1:] == (0.0, 0.0)
 
 
@@ -35,6 +35,14 @@ def test_slope_and_curvature_are_the_derivatives(name, s):
     scale = 1 + abs(here.slope) + abs(here.curvature)
     assert (ahead.value - behind.value) / (2 * d) == pytest.approx(here.slope, abs=1e-5 * scale)
     assert (ahead.slope - behind.slope) / (2 * d) == pytest.approx(here.curvature, abs=1e-3 * scale)
+
+
+@pytest.mark.parametrize("name", PROFILES)
+@pytest.mark.parametrize("s", [5e-324, 1e-300, 1e-9, 1e-3, 0.0041, 1 - 1e-3, 1 - 1e-16])
+def test_profiles_are_finite_and_in_range_next_to_their_ends(name, s):
+    h = Profile(name)(s)
+    assert np.all(np.isfinite(h))
+    assert 0.0 <= h.value <= 1.0
 
 
 @pytest.mark.parametrize(
@@ -109,7 +117,7 @@ def test_a_ramp_changes_its_mind_without_a_step(changes, name):
         if 0.0 < before.value < 1.0 and name in ("quintic", "tanh"):
             curve = 1 + abs(before.curvature)
             assert after.curvature == pytest.approx(before.curvature, abs=1e-5 * curve)
-        times = np.linspace(t, t + duration, 200)
+        times = np.linspace(t, t + duration, 80)
         values = np.array([new(x).value for x in times])
         assert np.all((values >= 0.0) & (values <= 1.0))
         assert new(t + duration).value == pytest.approx(target, abs=1e-9)
@@ -129,7 +137,7 @@ def test_a_reversed_ramp_is_about_as_fast_as_it_was_asked_to_be(fraction, first,
     up = Ramp.resting(0.0).towards(1.0, first, 0.0)
     t = fraction * first
     down = up.towards(0.0, second, t)
-    slopes = [down(x).slope for x in np.linspace(t, t + second, 400)]
+    slopes = [down(x).slope for x in np.linspace(t, t + second, 150)]
     assert -min(slopes) <= 5.0 / second + 1e-9
 
 

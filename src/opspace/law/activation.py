@@ -21,6 +21,7 @@ class Activation(NamedTuple):
 
 
 _INSTANT = 1e-9
+_TANH_EDGE = 4e-3
 _OFF = Activation(0.0, 0.0, 0.0)
 _ON = Activation(1.0, 0.0, 0.0)
 
@@ -51,10 +52,10 @@ def _half_sine(s: float) -> Activation:
 
 
 def _tanh(s: float) -> Activation:
+    # Nearer to an end the value equals 0 or 1 to the last bit and cosh overflows.
+    if not _TANH_EDGE < s < 1.0 - _TANH_EDGE:
+        return _ON if s > 0.5 else _OFF
     argument = 1.0 / (1.0 - s) - 1.0 / s
-    # Beyond this the value equals 0 or 1 to the last bit and cosh would overflow.
-    if abs(argument) > 300.0:
-        return _ON if argument > 0.0 else _OFF
     slope = 1.0 / (1.0 - s) ** 2 + 1.0 / s**2
     curvature = 2.0 / (1.0 - s) ** 3 - 2.0 / s**3
     tangent = math.tanh(argument)

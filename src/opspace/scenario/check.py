@@ -55,7 +55,7 @@ class Report:
         tool: Default tool frame.
         joints: Its joints; those of a floating base are left out.
         sigma: Eigenvalues of J M⁻¹ Jᵀ at the reference posture by task, strongest first, as
-            multiples of their mean over the workspace.
+            multiples of what is usual in the workspace.
         scale: That mean by task, 1/kg or 1/(kg·m²).
         buffer: Multiples at which directions are absent and fully active.
         warnings: What deserves a look.

@@ -35,7 +35,7 @@ class Singularity(Entry):
     )
     scale: Literal["relative", "absolute"] = Field(
         default="relative",
-        description="multiples of the mean over the workspace, or absolute [1/kg, 1/(kg·m²)]",
+        description="multiples of what is usual in the workspace, or absolute [1/kg, 1/(kg·m²)]",
     )
     profile: ProfileName = Field(default="quintic", description="shape of the activation")
 
