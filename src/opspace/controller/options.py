@@ -91,7 +91,7 @@ class Scales:
             self.unit = 0.5 / option.upper
 
     def prepare(self, task: Task) -> None:
-        """Bind a task to the robot, and find its scale where that is not known yet.
+        """Bind a task and its activation to the robot, and find its scale where that is not known yet.
 
         Args:
             task: A task that no tick is using.
@@ -108,6 +108,9 @@ class Scales:
             # Replaced as a whole, because a tick in another thread may be reading it.
             self._known = {**alive, id(task): entry}
         task.bind(self._robot)
+        bind = getattr(task.activation, "bind", None)
+        if bind is not None:
+            bind(self._robot)
 
     def reference(self, task: Task) -> np.ndarray:
         """Return the reference of a prepared task's rows, (m,).

@@ -92,6 +92,10 @@ class Member:
         """Number of the level where it will be when everything has arrived."""
         return self.places[self.goal].level
 
+    def gone(self, t: float) -> bool:
+        """Tell whether it is out at time ``t`` [s]."""
+        return self.leaving and self.presence.arrived(t)
+
     def settled(self, t: float) -> bool:
         """Tell whether nothing about it changes from time ``t`` [s] on."""
         return len(self.places) == 1 and self.presence.arrived(t)

@@ -98,7 +98,7 @@ class Insert(Request):
         """See `Request`."""
         timing = self.timing
         member = members.get(self.task.name)
-        if member is None:
+        if member is None or member.gone(t):
             self.task.reset()
             presence = Variable(0.0, timing.profile)
             member = members[self.task.name] = Member(self.task, presence, [Place(self.level)])

@@ -137,7 +137,7 @@ class Transitions:
 
     def _tidy(self, t: float) -> None:
         for name, member in list(self._members.items()):
-            if member.leaving and member.presence.arrived(t):
+            if member.gone(t):
                 del self._members[name]
             elif len(member.places) > 1:
                 member.tidy(t)
