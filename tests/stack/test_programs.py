@@ -121,7 +121,7 @@ SMOOTH = st.floats(0.15, 0.5)
 
 
 @pytest.mark.parametrize("blending", ["idv", "chain"])
-@settings(max_examples=60)
+@settings(max_examples=50)
 @given(steps=programs(ANY))
 def test_a_step_is_at_most_what_the_activations_allow(bench, blending, steps):
     bound = StepBound()
@@ -136,7 +136,7 @@ def test_a_step_is_at_most_what_the_activations_allow(bench, blending, steps):
 
 
 @pytest.mark.parametrize("blending", ["idv", "chain"])
-@settings(max_examples=25)
+@settings(max_examples=12)
 @given(steps=programs(SMOOTH))
 def test_halving_the_tick_halves_the_largest_step(bench, blending, steps):
     coarse, fine = (

@@ -32,6 +32,10 @@ class Variable:
         """Evaluate it at time ``t`` [s]."""
         return self.ramp(t).value
 
+    def idle(self, t: float) -> bool:
+        """Tell whether it has had no effect up to time ``t`` [s] and may be forgotten."""
+        return self.value(t) == 0.0
+
     def send(self, target: float, duration: float, t: float, profile: str) -> None:
         """Turn it towards 0 or 1 at time ``t`` [s], to arrive ``duration`` [s] later.
 
@@ -115,6 +119,9 @@ class Member:
         for k in reversed(range(len(self.places))):
             if self.places[k].level == level and self._turn(k, duration, t, profile):
                 return
+        # What has not begun yet, as of several requests between two ticks, need not begin.
+        while (last := self.places[-1].arrival) is not None and last.idle(t):
+            self.places.pop()
         arrival = Variable(0.0, profile)
         arrival.send(1.0, duration, t, profile)
         self.places.append(Place(level, arrival))
@@ -136,6 +143,10 @@ class Member:
 
 class SharedVariable(Variable):
     """The activation of a swap: it moves two tasks, so neither of them may turn it alone."""
+
+    def idle(self, t: float) -> bool:
+        """Tell whether one of the tasks may forget it: never, the other one still needs it."""
+        return False
 
 
 def swap(a: Member, b: Member, duration: float, t: float, profile: str) -> None:
