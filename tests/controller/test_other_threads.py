@@ -12,7 +12,7 @@ from opspace.tasks import JointTask, PositionTask, PostureTask
 from tests.stack.arm import arm, state
 
 STAY = "height"
-DT = 0.003
+DT = 0.005
 
 
 class Loop(threading.Thread):
@@ -65,14 +65,14 @@ class Client(threading.Thread):
             while self.loop.running and self.loop.error is None:
                 self.ask()
                 self.asked += 1
-                time.sleep(0.03)
+                time.sleep(0.04)
         except BaseException as error:
             self.error = error
 
     def ask(self):
         a, b = self.rng.choice(len(self.tasks), 2, replace=False)
         a, b = self.tasks[a], self.tasks[b]
-        level, duration = float(self.rng.integers(-1, 4)), float(self.rng.uniform(0.02, 0.1))
+        level, duration = float(self.rng.integers(-1, 4)), float(self.rng.uniform(0.02, 0.06))
         if a.name not in self.levels:
             self.stack.insert(a, level, duration)
             self.levels[a.name] = level
@@ -125,7 +125,7 @@ def check(seconds):
         expected |= client.levels
     assert found == expected
     assert ticks > 20 * seconds
-    assert loop.blended > 0.5 * ticks
+    assert loop.blended > 0.3 * ticks
 
 
 def test_nothing_is_lost_or_torn_in_a_short_while():
