@@ -13,6 +13,7 @@ import numpy as np
 
 import opspace as osc
 
+DEFAULT = osc.Singularity()
 KP_TASK, KP_POSTURE = 100.0, 25.0
 """Stiffness of the tasks in Cartesian space and of the posture, 1/s²."""
 MAX_SPEED = 20.0
@@ -200,7 +201,7 @@ def run(
     levels: Sequence[osc.Task],
     duration: float,
     *,
-    singularity: osc.Singularity | None = osc.Singularity(),
+    singularity: osc.Singularity | None = DEFAULT,
     q: np.ndarray | None = None,
     back: float = 0.0,
 ) -> Run:

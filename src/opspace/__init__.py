@@ -46,11 +46,14 @@ if TYPE_CHECKING:
     from opspace.sim import StopRule as StopRule
     from opspace.sim import simulate as simulate
     from opspace.stack import Stack as Stack
+    from opspace.tasks import ActivationProduct as ActivationProduct
     from opspace.tasks import Chain as Chain
     from opspace.tasks import Circle as Circle
     from opspace.tasks import ComTask as ComTask
     from opspace.tasks import Constant as Constant
+    from opspace.tasks import DistanceBuffer as DistanceBuffer
     from opspace.tasks import JerkLimited as JerkLimited
+    from opspace.tasks import JointBuffer as JointBuffer
     from opspace.tasks import JointLimits as JointLimits
     from opspace.tasks import JointTask as JointTask
     from opspace.tasks import MinimumJerk as MinimumJerk
@@ -87,10 +90,10 @@ _NAMES = {
     "opspace.sim": "Observer Outcome Plant StopRule simulate",
     "opspace.stack": "Stack",
     "opspace.tasks": (
-        "Chain Circle ComTask Constant JerkLimited JointLimits JointTask MinimumJerk "
-        "OrientationMinimumJerk OrientationTask PoseReference PoseTask PositionTask PostureTask "
-        "Reference RelativeOrientationTask RelativePoseTask RelativePositionTask Sample Task "
-        "TaskTerms TrackingTask ViaPoints"
+        "ActivationProduct Chain Circle ComTask Constant DistanceBuffer JerkLimited JointBuffer "
+        "JointLimits JointTask MinimumJerk OrientationMinimumJerk OrientationTask PoseReference "
+        "PoseTask PositionTask PostureTask Reference RelativeOrientationTask RelativePoseTask "
+        "RelativePositionTask Sample Task TaskTerms TrackingTask ViaPoints"
     ),
 }
 _HOME = {name: module for module, names in _NAMES.items() for name in names.split()}

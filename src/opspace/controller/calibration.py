@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -26,9 +26,9 @@ class Calibration:
         brake: (n,) acceleration that half of the torque left by gravity gives each joint alone, the
             least over the workspace, rad/s².
         joint_sigma: Smallest eigenvalue of A⁻¹ over the workspace, 1/(kg·m²).
-        references: Per task name (m,): the median over the workspace of the smallest eigenvalue
-            of the task's own J A⁻¹ Jᵀ, one value for its rows in m and one for those in rad, 1/kg
-            and 1/(kg·m²).
+        references: Per name of a task that was in the stack at the start (m,): the median over the
+            workspace of the smallest eigenvalue of the task's own J A⁻¹ Jᵀ, one value for its rows
+            in m and one for those in rad, 1/kg and 1/(kg·m²).
     """
 
     brake: np.ndarray
@@ -36,37 +36,50 @@ class Calibration:
     references: dict[str, np.ndarray]
 
 
-def calibrate(robot: Robot, tasks: Iterable[Task]) -> Calibration:
-    """Visit random postures within the joint limits, always the same ones, and take the scales.
+class Workspace:
+    """Postures within the joint limits, always the same ones, visited on a copy of the robot.
+
+    A controller that runs is not disturbed, so tasks may be calibrated from another thread.
 
     Args:
-        robot: The robot; its state is changed.
-        tasks: Tasks bound to the robot; they are reset afterwards.
-
-    Returns:
-        The scales.
+        robot: The robot; it is left alone.
     """
-    tasks = list(tasks)
-    brake = np.full(robot.nv, np.inf)
-    joint_sigma = np.inf
-    smallest: dict[str, list[np.ndarray]] = {task.name: [] for task in tasks}
-    for q in sample_postures(robot):
-        robot.update(q, np.zeros(robot.nv))
-        inverse = np.linalg.inv(robot.M)
-        joint_sigma = min(joint_sigma, float(np.linalg.eigvalsh(inverse)[0]))
-        spare = np.maximum(robot.torque_limit - np.abs(robot.gravity), 0.0)
-        brake = np.minimum(brake, 0.5 * spare * np.diag(inverse))
-        for task in tasks:
+
+    def __init__(self, robot: Robot) -> None:
+        self._robot = robot = robot.fresh()
+        self._visited: list[tuple[np.ndarray, np.ndarray]] = []
+        brake = np.full(robot.nv, np.inf)
+        joint_sigma = np.inf
+        for q in sample_postures(robot):
+            robot.update(q, np.zeros(robot.nv))
+            inverse = np.linalg.inv(robot.M)
+            joint_sigma = min(joint_sigma, float(np.linalg.eigvalsh(inverse)[0]))
+            spare = np.maximum(robot.torque_limit - np.abs(robot.gravity), 0.0)
+            brake = np.minimum(brake, 0.5 * spare * np.diag(inverse))
+            self._visited.append((q, inverse))
+        self.brake = np.where(np.isfinite(brake), np.clip(brake, *BRAKE_RANGE), UNKNOWN_BRAKE)
+        self.joint_sigma = joint_sigma
+
+    def reference(self, task: Task) -> np.ndarray:
+        """Take the scale of a task's rows, see `Calibration`.
+
+        Args:
+            task: A task that no tick is using; it is left bound to a copy of the robot.
+
+        Returns:
+            (m,) medians of the smallest eigenvalue, 1/kg or 1/(kg·m²).
+        """
+        robot = self._robot
+        task.bind(robot)
+        smallest: list[np.ndarray] = []
+        for q, inverse in self._visited:
+            robot.update(q, np.zeros(robot.nv))
             J = task.evaluate(robot, 0.0).J
-            smallest[task.name].append(_smallest_per_unit(task, J @ inverse @ J.T))
-    for task in tasks:
-        task.reset()
-    brake = np.where(np.isfinite(brake), np.clip(brake, *BRAKE_RANGE), UNKNOWN_BRAKE)
-    references = {name: np.median(found, axis=0) for name, found in smallest.items()}
-    return Calibration(brake, joint_sigma, references)
+            smallest.append(_smallest_per_unit(task, J @ inverse @ J.T))
+        return np.median(smallest, axis=0)
 
 
-def sample_postures(robot: Robot) -> Iterable[np.ndarray]:
+def sample_postures(robot: Robot) -> Iterator[np.ndarray]:
     """Visit postures uniformly distributed within the joint limits, one turn where there are none.
 
     Args:

@@ -30,12 +30,15 @@ class TaskStatus:
     """One task in one tick.
 
     Attributes:
-        activation: h of the task, 0 to 1.
+        activation: h of the task, 0 to 1: its presence in the stack times its own activation.
+        levels: Numbers of the levels where it is, each with its weight; more than one while the task
+            moves. The weights sum to 1.
         error: (m,) x_d − x, in the units of the task's rows.
         error_norm: Euclidean norm of ``error``.
     """
 
     activation: float
+    levels: tuple[tuple[float, float], ...]
     error: np.ndarray
     error_norm: float
 
@@ -45,13 +48,16 @@ class LevelStatus:
     """One level in one tick.
 
     Attributes:
-        tasks: Names of its tasks.
+        level: Number of the level.
+        tasks: Names of its tasks; during transitions those of the stack with the largest weight
+            among the ones that have tasks here, which the directions belong to.
         sigma: (k,) eigenvalues of the projected inverse inertia of the level, Eq. 25, strongest
             first; multiples of the tasks' reference values unless the buffer is absolute.
         activation: (k,) activation of each direction.
         directions: (m, k) the directions as columns, in the stacked rows of the tasks.
     """
 
+    level: float
     tasks: tuple[str, ...]
     sigma: np.ndarray
     activation: np.ndarray
@@ -66,7 +72,7 @@ class Command:
         t: Time of the tick, s.
         tau: (n,) joint torque, N·m, bias included; always finite.
         status: What happened.
-        tasks: Status of each task by name.
+        tasks: Status of each task in the stack by name.
         levels: Status of each level, most important first; joint limits are not among them.
         limits: Activation of the joint-limit tasks that are not at 0, by "joint/side".
         hard_solves: Hard torques that entered the blend.

@@ -2,21 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 
 from opspace.controller import Command, Controller
+from opspace.errors import InputError
 from opspace.record.format import Column, Ended
 from opspace.record.writer import Recorder
+from opspace.tasks import Task
+
+_NOTHING = np.zeros(0)
 
 
-def columns_of(controller: Controller) -> list[Column]:
+def columns_of(controller: Controller, tasks: Sequence[Task] = ()) -> list[Column]:
     """List the columns of a controller's recording, in the order of `TickRecorder`'s rows.
 
     Args:
         controller: The controller that will be recorded.
+        tasks: Prepared tasks that will be in its stack later.
 
     Returns:
         Columns with names, units and descriptions.
@@ -30,21 +35,21 @@ def columns_of(controller: Controller) -> list[Column]:
     ):
         columns += [Column(f"{group}/{j}", unit, f"{what} of {j}") for j in robot.joint_names]
     columns += [Column(f"tool/{a}", "m", f"{robot.tool} position, {a}") for a in "xyz"]
-    for task in stack:
+    for task in [*stack, *tasks]:
         columns.append(Column(f"tasks/{task.name}/activation", "1", f"activation of {task.name}"))
         columns += [
             Column(f"tasks/{task.name}/error/{i}", unit, f"row {i}: desired minus actual")
             for i, unit in enumerate(task.units)
         ]
-    for i, level in enumerate(stack.levels):
-        size = min(sum(task.rows for task in level), robot.nv)
+    for number, level in stack.levels_by_number.items():
+        size, prefix = _directions(controller, level), f"levels/{number:g}"
         names = ", ".join(task.name for task in level)
         columns += [
-            Column(f"levels/{i}/sigma/{k}", "1", f"eigenvalue {k} of Eq. 25 of {names}")
+            Column(f"{prefix}/sigma/{k}", "1", f"eigenvalue {k} of Eq. 25 of {names}")
             for k in range(size)
         ]
         columns += [
-            Column(f"levels/{i}/activation/{k}", "1", f"activation of direction {k} of {names}")
+            Column(f"{prefix}/activation/{k}", "1", f"activation of direction {k} of {names}")
             for k in range(size)
         ]
     if stack.limits is not None:
@@ -62,13 +67,21 @@ def columns_of(controller: Controller) -> list[Column]:
 class TickRecorder:
     """Record a run: one row per tick, on disk before the plant advances.
 
+    The columns are those of the tasks and levels in the stack at the start, and of the tasks
+    declared here; they hold NaN while there is no such task or level. A task that is inserted
+    without having been declared is not recorded, nor is a level that is new. Of a level that
+    grows only as many directions are recorded as it had at the start, the strongest.
+
     Args:
         directory: Where the recording is written.
         controller: The controller of the run.
         header: What the recording says about itself: scenario, seed, time step.
+        tasks: Tasks that will be inserted later.
         overwrite: Replace a recording that is already there.
 
     Raises:
+        InputError: A declared task does not fit the robot, or its name is taken.
+        UnknownNameError: A declared task names what the robot does not have.
         RecordingError: There is a recording already, or the directory cannot be written.
     """
 
@@ -78,27 +91,39 @@ class TickRecorder:
         controller: Controller,
         header: Mapping[str, object],
         *,
+        tasks: Sequence[Task] = (),
         overwrite: bool = False,
     ) -> None:
+        stack = controller.stack
+        for task in tasks:
+            stack.prepare(task)
         self._controller = controller
         self._tool = controller.robot.frame_id(controller.robot.tool)
-        columns = columns_of(controller)
-        self._width = len(columns)
-        self._sizes = [
-            min(sum(task.rows for task in level), controller.robot.nv)
-            for level in controller.stack.levels
-        ]
+        names = [task.name for task in [*stack, *tasks]]
+        for name in names:
+            if names.count(name) > 1:
+                raise InputError(f"two tasks to record are named {name!r}")
+        self._rows = {task.name: task.rows for task in [*stack, *tasks]}
+        self._levels = {
+            number: _directions(controller, level)
+            for number, level in stack.levels_by_number.items()
+        }
+        columns = columns_of(controller, tasks)
         self._recorder = Recorder(directory, columns, header, overwrite=overwrite)
 
     def observe(self, q: np.ndarray, v: np.ndarray, command: Command) -> None:
         """Write one tick."""
         controller = self._controller
         parts = [[command.t], q, v, command.tau, controller.robot.position(self._tool)]
-        for task in controller.stack:
-            found = command.tasks[task.name]
-            parts += [[found.activation], found.error]
-        for size, level in zip(self._sizes, command.levels, strict=True):
-            parts += [_padded(level.sigma, size), _padded(level.activation, size)]
+        for name, rows in self._rows.items():
+            found = command.tasks.get(name)
+            h, error = (np.nan, _NOTHING) if found is None else (found.activation, found.error)
+            parts += [[h], _padded(error, rows)]
+        levels = {level.level: level for level in command.levels}
+        for number, size in self._levels.items():
+            level = levels.get(number)
+            sigma, h = (_NOTHING, _NOTHING) if level is None else (level.sigma, level.activation)
+            parts += [_padded(sigma, size), _padded(h, size)]
         if controller.stack.limits is not None:
             parts.append([command.limits.get(s.name, 0.0) for s in controller.stack.limits.sides])
         parts.append([float(command.hard_solves), float(command.status)])
@@ -109,7 +134,11 @@ class TickRecorder:
         self._recorder.close(how, reason)
 
 
+def _directions(controller: Controller, level: Sequence[Task]) -> int:
+    return min(sum(task.rows for task in level), controller.robot.nv)
+
+
 def _padded(values: np.ndarray, size: int) -> np.ndarray:
     padded = np.full(size, np.nan)
-    padded[: values.size] = values
+    padded[: values.size] = values[:size]
     return padded

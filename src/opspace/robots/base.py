@@ -145,6 +145,10 @@ class AdapterBase(ABC):
         return self._cached("com_drift", 0, self._com_drift)
 
     @abstractmethod
+    def fresh(self) -> AdapterBase:
+        """Return the same robot with a state of its own; the model is shared."""
+
+    @abstractmethod
     def integrate(self, q: np.ndarray, v: np.ndarray, dt: float) -> np.ndarray:
         """Return q ⊕ v dt on the configuration manifold, (nq,)."""
 

@@ -51,6 +51,10 @@ class MujocoRobot(AdapterBase):
         """Return b + g, (nv,) N·m. Friction is not part of it."""
         return self._bias_view
 
+    def fresh(self) -> MujocoRobot:
+        """Return the same robot with a state of its own; the model is shared."""
+        return MujocoRobot(self.description, self._model)
+
     def integrate(self, q: np.ndarray, v: np.ndarray, dt: float) -> np.ndarray:
         """Return q ⊕ v dt on the configuration manifold, (nq,)."""
         moved = np.array(q, dtype=float)

@@ -53,6 +53,10 @@ class PinocchioRobot(AdapterBase):
         """Return b + g, (nv,) N·m. Friction is not part of it."""
         return self._bias
 
+    def fresh(self) -> PinocchioRobot:
+        """Return the same robot with a state of its own; the model is shared."""
+        return PinocchioRobot(self.description, self._model)
+
     def integrate(self, q: np.ndarray, v: np.ndarray, dt: float) -> np.ndarray:
         """Return q ⊕ v dt on the configuration manifold, (nq,)."""
         moved = pin.integrate(self._model, self._order(q), np.asarray(v, dtype=float) * dt)

@@ -121,6 +121,13 @@ class Robot(Protocol):
         """Return Jdot v of the centre of mass, (3,) m/s²."""
         ...
 
+    def fresh(self) -> Robot:
+        """Return the same robot with a state of its own, cheaply: the model is shared.
+
+        Frame ids are those of this robot, and results are equal to the last bit.
+        """
+        ...
+
     def integrate(self, q: np.ndarray, v: np.ndarray, dt: float) -> np.ndarray:
         """Return q ⊕ v dt on the configuration manifold, (nq,)."""
         ...

@@ -1,5 +1,8 @@
 """What a robot can be asked for, and how the wish moves in time."""
 
+from opspace.tasks.activations import ActivationProduct as ActivationProduct
+from opspace.tasks.activations import DistanceBuffer as DistanceBuffer
+from opspace.tasks.activations import JointBuffer as JointBuffer
 from opspace.tasks.base import Task as Task
 from opspace.tasks.base import TaskTerms as TaskTerms
 from opspace.tasks.com import ComTask as ComTask

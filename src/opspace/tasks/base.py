@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -44,7 +44,12 @@ class Task(ABC):
         name: Name of the task, unique within a stack.
         rows: m, the number of task rows.
         units: Unit of each row of the error, "m" or "rad".
+        activation: A function (robot, t) -> [0, 1] that the presence of the task in its stack is
+            multiplied with at every tick, or None for 1. The torque is as smooth as its values:
+            assigning another function is a step unless both have the same value then.
     """
+
+    activation: Callable[[Robot, float], float] | None = None
 
     # Rows that share one number of max_speed.
     _speed_groups: tuple[slice, ...] = (slice(None),)

@@ -1,0 +1,7 @@
+"""The tasks of a controller: who is in, at which level, and how that changes in time."""
+
+from opspace.stack.members import Member as Member
+from opspace.stack.mixture import Mixture as Mixture
+from opspace.stack.mixture import Slot as Slot
+from opspace.stack.mixture import mixture as mixture
+from opspace.stack.stack import Stack as Stack

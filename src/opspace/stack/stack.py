@@ -1,0 +1,226 @@
+"""The ordered tasks of a controller, which may come, go and change rank while it runs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+
+from opspace.errors import InputError
+from opspace.stack.members import Member
+from opspace.stack.requests import (
+    Insert,
+    Move,
+    Remove,
+    Swap,
+    Timing,
+    checked_level,
+    checked_task,
+)
+from opspace.stack.transitions import Transitions
+from opspace.tasks import JointLimits, Task
+
+
+class Stack:
+    """Tasks in order of priority, most important first.
+
+    Every entry of the list is a level of its own; an entry that is itself a list holds several
+    tasks at one level, which have no priority among them. Joint limits may stand anywhere in the
+    list and are always above everything else.
+
+    The levels of the list have the numbers 0, 1, 2, ...; joint limits and empty lists take none.
+    Later a task may be put at any number: an existing one to share that level, 0.5 to be
+    between 0 and 1, −1 to be above them all.
+
+    `insert`, `remove`, `move` and `swap` may be called at any time and from any thread. They are
+    checked at once and start with the controller's next tick, or with the first tick at or after
+    ``start_time``. Transitions may overlap in any number, and any of them may be turned around
+    or retimed on its way: what is asked last holds, and nothing steps. A transition on its way
+    that gets a new goal keeps its profile.
+
+    A stack belongs to one controller.
+
+    Args:
+        levels: Tasks, lists of tasks, and at most one `JointLimits`.
+
+    Raises:
+        InputError: An entry that is no task, a name used twice, or more than one `JointLimits`.
+    """
+
+    def __init__(self, levels: Sequence[Task | JointLimits | Sequence[Task]]) -> None:
+        self.limits: JointLimits | None = None
+        self._transitions = Transitions()
+        number = 0
+        for entry in levels:
+            if isinstance(entry, JointLimits):
+                if self.limits is not None:
+                    raise InputError("a stack takes one JointLimits, which covers every joint")
+                self.limits = entry
+                continue
+            level = (entry,) if isinstance(entry, Task) else _as_level(entry)
+            for task in level:
+                self._transitions.start_with(task, float(number))
+            number += bool(level)
+
+    def __iter__(self) -> Iterator[Task]:
+        """Iterate over the tasks, most important first."""
+        return (task for level in self.levels for task in level)
+
+    @property
+    def levels(self) -> tuple[tuple[Task, ...], ...]:
+        """Tasks by level, most important first, each at the level where it is or goes.
+
+        Tasks that are leaving are still among them, those that wait for their time not yet.
+        """
+        return tuple(self.levels_by_number.values())
+
+    @property
+    def levels_by_number(self) -> dict[float, tuple[Task, ...]]:
+        """The same by the number of the level."""
+        found = self._transitions.levels()
+        return {
+            number: tuple(task for level, task in found if level == number)
+            for number in sorted({level for level, _ in found})
+        }
+
+    @property
+    def settled(self) -> bool:
+        """Whether no transition was on its way or due at the last tick; later ones may wait."""
+        return self._transitions.settled()
+
+    def insert(
+        self,
+        task: Task,
+        level: float,
+        duration: float = 0.5,
+        *,
+        profile: str = "quintic",
+        start_time: float | None = None,
+    ) -> None:
+        """Insert a task; one that is leaving comes back, one that is coming is retimed.
+
+        Preparing a task that the controller has not seen takes some 20 ms, here and not in the
+        tick; `prepare` does it beforehand.
+
+        Args:
+            task: The task. Without a target it holds what it finds when it starts.
+            level: Number of its level; lower is more important.
+            duration: How long it takes, s; 0 is a hard switch.
+            profile: Name of the activation profile.
+            start_time: When it starts, in the time of the controller, s; None is the next tick.
+
+        Raises:
+            InputError: No task, a name that another task has, a task that is at another level, or
+                a number that cannot be used.
+            UnknownNameError: A frame or joint that the robot does not have, or an unknown profile.
+        """
+        timing = Timing(duration, profile, start_time)
+        self._transitions.ask(Insert(timing, checked_task(task), checked_level(level)))
+
+    def remove(
+        self,
+        task: Task | str,
+        duration: float = 0.5,
+        *,
+        profile: str = "quintic",
+        start_time: float | None = None,
+    ) -> None:
+        """Remove a task; one that is coming turns around, one that is leaving is retimed.
+
+        Args:
+            task: The task or its name.
+            duration: How long it takes, s; 0 is a hard switch.
+            profile: Name of the activation profile.
+            start_time: When it starts, in the time of the controller, s; None is the next tick.
+
+        Raises:
+            InputError: A number that cannot be used.
+            UnknownNameError: No such task in the stack, or an unknown profile.
+        """
+        self._transitions.ask(Remove(Timing(duration, profile, start_time), task))
+
+    def move(
+        self,
+        task: Task | str,
+        level: float,
+        duration: float = 0.5,
+        *,
+        profile: str = "quintic",
+        start_time: float | None = None,
+    ) -> None:
+        """Move a task to another level; it is never absent on the way.
+
+        Args:
+            task: The task or its name.
+            level: Number of the level; lower is more important.
+            duration: How long it takes, s; 0 is a hard switch.
+            profile: Name of the activation profile.
+            start_time: When it starts, in the time of the controller, s; None is the next tick.
+
+        Raises:
+            InputError: A number that cannot be used.
+            UnknownNameError: No such task in the stack, or it is leaving; an unknown profile.
+        """
+        timing = Timing(duration, profile, start_time)
+        self._transitions.ask(Move(timing, task, checked_level(level)))
+
+    def swap(
+        self,
+        first: Task | str,
+        second: Task | str,
+        duration: float = 0.5,
+        *,
+        profile: str = "quintic",
+        start_time: float | None = None,
+    ) -> None:
+        """Exchange the levels of two tasks; asked again on the way, it is turned around.
+
+        Args:
+            first: One task or its name.
+            second: The other.
+            duration: How long it takes, s; 0 is a hard switch.
+            profile: Name of the activation profile.
+            start_time: When it starts, in the time of the controller, s; None is the next tick.
+
+        Raises:
+            InputError: The same task twice, or a number that cannot be used.
+            UnknownNameError: No such task in the stack, or it is leaving; an unknown profile.
+        """
+        self._transitions.ask(Swap(Timing(duration, profile, start_time), first, second))
+
+    def cancel_scheduled(self) -> None:
+        """Forget every request that has not started."""
+        self._transitions.cancel()
+
+    def prepare(self, task: Task) -> None:
+        """Do beforehand what `insert` would do with a new task: look up names and calibrate.
+
+        Args:
+            task: A task.
+
+        Raises:
+            InputError: No task, or one that does not fit the robot.
+            UnknownNameError: A frame or joint that the robot does not have.
+        """
+        self._transitions.prepare(checked_task(task))
+
+    def attach(self, prepare: Callable[[Task], None]) -> None:
+        """Let a controller prepare every task that is in the stack or will be.
+
+        Args:
+            prepare: Gets a task ready for the controller's ticks.
+        """
+        self._transitions.attach(prepare)
+
+    def begin_tick(self, t: float) -> tuple[Member, ...]:
+        """Start what is due at time ``t`` [s], drop what has left, and return the tasks there are.
+
+        For the controller's thread, once per tick.
+        """
+        return self._transitions.begin_tick(t)
+
+
+def _as_level(entry: object) -> tuple[Task, ...]:
+    if isinstance(entry, Sequence) and all(isinstance(task, Task) for task in entry):
+        return tuple(entry)
+    raise InputError(
+        f"a stack holds tasks, lists of tasks and JointLimits, not {type(entry).__name__}"
+    )

@@ -1,0 +1,174 @@
+"""What waits to happen to the tasks of a stack, and what is happening to them."""
+
+from __future__ import annotations
+
+import math
+from bisect import insort
+from collections.abc import Callable
+from threading import Lock, RLock
+from typing import NamedTuple
+
+from opspace.errors import InputError, OpspaceError
+from opspace.stack.members import Member, Place, Variable
+from opspace.stack.requests import Insert, Known, Request
+from opspace.tasks import Task
+
+
+class _Queued(NamedTuple):
+    order: float
+    request: Request
+
+
+class Transitions:
+    """The tasks of a stack and the requests that wait, safe to use from any thread.
+
+    The controller's thread changes tasks in `begin_tick`; every other one adds to the queue.
+    """
+
+    def __init__(self) -> None:
+        self._members: dict[str, Member] = {}
+        self._queue: list[_Queued] = []
+        self._now: float | None = None
+        self._ticked: tuple[Member, ...] = ()
+        self._prepare: Callable[[Task], None] | None = None
+        # One request at a time is prepared, which takes long; the other lock is held briefly.
+        self._requesting = RLock()
+        self._lock = Lock()
+
+    def start_with(self, task: Task, level: float) -> None:
+        """Add a task that is in from the start.
+
+        Raises:
+            InputError: Another task has its name.
+        """
+        if task.name in self._members:
+            raise InputError(
+                f"two tasks are named {task.name!r}; give each a name of its own (name=...)"
+            )
+        self._members[task.name] = Member(task, Variable(1.0), [Place(level)])
+        self._ticked = tuple(self._members.values())
+
+    def levels(self) -> list[tuple[float, Task]]:
+        """List the tasks, each with the level where it is or goes."""
+        with self._lock:
+            return [(member.level, member.task) for member in self._members.values()]
+
+    def settled(self) -> bool:
+        """Tell whether at the last tick nothing was on its way or due."""
+        with self._lock:
+            now = -math.inf if self._now is None else self._now
+            due = any(_is_due(queued.request, now) for queued in self._queue)
+            return not due and all(member.settled(now) for member in self._members.values())
+
+    def ask(self, request: Request) -> None:
+        """Queue a request.
+
+        Raises:
+            InputError: It cannot be fulfilled, or not together with those that wait.
+            UnknownNameError: It names a task that is not there.
+        """
+        with self._requesting:
+            if isinstance(request, Insert):
+                with self._lock:
+                    self._checked(request)
+                self.prepare(request.task)
+            with self._lock:
+                insort(self._queue, self._checked(request), key=lambda queued: queued.order)
+
+    def cancel(self) -> None:
+        """Empty the queue."""
+        with self._requesting, self._lock:
+            self._queue.clear()
+
+    def prepare(self, task: Task) -> None:
+        """Get a task ready that no tick is using."""
+        with self._requesting:
+            with self._lock:
+                used = [*(m.task for m in self._members.values()), *self._waiting()]
+            if self._prepare is not None and all(task is not one for one in used):
+                self._prepare(task)
+
+    def attach(self, prepare: Callable[[Task], None]) -> None:
+        """Prepare every task that is there or will be, and from now on every new one."""
+        with self._requesting:
+            with self._lock:
+                tasks = [*(m.task for m in self._members.values()), *self._waiting()]
+            for task in tasks:
+                prepare(task)
+            self._prepare = prepare
+
+    def begin_tick(self, t: float) -> tuple[Member, ...]:
+        """Start what is due, and drop what has left.
+
+        Requests that are being made in another thread at this very moment wait for the next tick,
+        so that a tick never waits for them.
+
+        Args:
+            t: Time of the tick, s.
+
+        Returns:
+            The tasks of this tick, which only the thread of the controller changes.
+        """
+        if self._lock.acquire(blocking=False):
+            try:
+                self._start_due(t)
+                self._tidy(t)
+                self._ticked = tuple(self._members.values())
+            finally:
+                self._lock.release()
+        self._now = t
+        return self._ticked
+
+    def _start_due(self, t: float) -> None:
+        before = self._now
+        start = -math.inf
+        waiting: list[_Queued] = []
+        for queued in self._queue:
+            request = queued.request
+            if not _is_due(request, t):
+                waiting.append(queued)
+                continue
+            wanted = request.timing.start_time
+            # Between two ticks it starts on time; what is in the past would be a step.
+            on_time = wanted is not None and before is not None and wanted > before
+            start = max(start, wanted if wanted is not None and on_time else t)
+            request.apply(self._members, start)
+        self._queue = waiting
+
+    def _tidy(self, t: float) -> None:
+        for name, member in list(self._members.items()):
+            if member.gone(t):
+                del self._members[name]
+            elif len(member.places) > 1:
+                member.tidy(t)
+
+    def _waiting(self) -> list[Task]:
+        return [q.request.task for q in self._queue if isinstance(q.request, Insert)]
+
+    def _checked(self, request: Request) -> _Queued:
+        """Go through everything that is asked, in the order in which it will happen."""
+        known = {
+            name: Known(member.task, member.level, member.leaving)
+            for name, member in self._members.items()
+        }
+        now = -math.inf if self._now is None else self._now
+        wanted = request.timing.start_time
+        new = _Queued(now if wanted is None else max(wanted, now), request)
+        for queued in self._queue:
+            if queued.order <= new.order:
+                queued.request.check(known)
+        request.check(known)
+        for queued in self._queue:
+            if queued.order > new.order:
+                try:
+                    queued.request.check(known)
+                except OpspaceError as error:
+                    raise InputError(
+                        f"this makes a request for t = {queued.order:g} s impossible: {error}"
+                    ) from None
+        return new
+
+
+def _is_due(request: Request, t: float) -> bool:
+    wanted = request.timing.start_time
+    return wanted is None or wanted <= t

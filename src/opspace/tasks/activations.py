@@ -1,0 +1,111 @@
+"""Ready-made activations for tasks that are there only in some states."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from opspace.errors import unknown_name
+from opspace.law import Buffer
+from opspace.tasks.validation import finite_array
+
+if TYPE_CHECKING:
+    from opspace.robots.protocol import Robot
+
+
+class JointBuffer:
+    """Activation by the position of a joint of one degree of freedom, see `opspace.Buffer`.
+
+    Args:
+        joint: Name of the joint.
+        off: Position at and beyond which the task is absent, rad or m.
+        on: Position at and beyond which it is fully there; below ``off`` if that is the side.
+        profile: Name of the profile.
+
+    Raises:
+        InputError: The two positions coincide or are not finite.
+        UnknownNameError: An unknown profile; at binding an unknown joint.
+    """
+
+    def __init__(self, joint: str, off: float, on: float, profile: str = "quintic") -> None:
+        self.joint = joint
+        self.buffer = Buffer(off, on, profile)
+
+    def bind(self, robot: Robot) -> None:
+        """Check that the robot has the joint."""
+        if self.joint not in robot.joint_names:
+            raise unknown_name("joint", self.joint, robot.joint_names)
+
+    def __call__(self, robot: Robot, t: float) -> float:
+        """Evaluate the activation at the robot's present state."""
+        return self.buffer(float(robot.q[robot.joint_names.index(self.joint)])).value
+
+
+class DistanceBuffer:
+    """Activation by the distance of a frame from a point in the world, see `opspace.Buffer`.
+
+    Args:
+        point: (3,) m.
+        off: Distance at and beyond which the task is absent, m.
+        on: Distance at and beyond which it is fully there, m; below ``off`` for a task that is
+            there near the point.
+        frame: Name of the frame; None is the robot's tool.
+        profile: Name of the profile.
+
+    Raises:
+        InputError: The two distances coincide, or a number that is not finite.
+        UnknownNameError: An unknown profile; at binding an unknown frame.
+    """
+
+    def __init__(
+        self,
+        point: ArrayLike,
+        off: float,
+        on: float,
+        *,
+        frame: str | None = None,
+        profile: str = "quintic",
+    ) -> None:
+        self.point = finite_array(point, (3,), "point of a distance buffer")
+        self.frame = frame
+        self.buffer = Buffer(off, on, profile)
+
+    def bind(self, robot: Robot) -> None:
+        """Check that the robot has the frame."""
+        self._frame(robot)
+
+    def __call__(self, robot: Robot, t: float) -> float:
+        """Evaluate the activation at the robot's present state."""
+        away = robot.position(self._frame(robot)) - self.point
+        return self.buffer(float(np.linalg.norm(away))).value
+
+    def _frame(self, robot: Robot) -> int:
+        return robot.frame_id(robot.tool if self.frame is None else self.frame)
+
+
+class ActivationProduct:
+    """Product of several activations: the task is there as far as all of them let it.
+
+    Args:
+        factors: Functions (robot, t) -> [0, 1].
+    """
+
+    def __init__(self, *factors: Callable[[Robot, float], float]) -> None:
+        self.factors = factors
+
+    def bind(self, robot: Robot) -> None:
+        """Check the names that the factors use."""
+        for factor in self.factors:
+            bind = getattr(factor, "bind", None)
+            if bind is not None:
+                bind(robot)
+
+    def __call__(self, robot: Robot, t: float) -> float:
+        """Evaluate the product at the robot's present state."""
+        product = 1.0
+        for factor in self.factors:
+            product *= factor(robot, t)
+        return product
