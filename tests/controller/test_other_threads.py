@@ -125,7 +125,7 @@ def check(seconds):
         expected |= client.levels
     assert found == expected
     # How fast the machine is does not matter, but the loop must have met transitions.
-    assert ticks > loop.blended > 3
+    assert ticks >= loop.blended > 3
 
 
 def test_nothing_is_lost_or_torn_in_a_short_while():
