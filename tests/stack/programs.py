@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+import numpy as np
 from hypothesis import strategies as st
 
 from opspace.errors import InputError, UnknownNameError
@@ -22,18 +23,34 @@ class Step:
     profile: str = "quintic"
 
 
-def programs(durations, waits=(0, 12), tasks=7, sizes=(4, 14)):
-    step = st.builds(
-        Step,
-        wait=st.integers(*waits),
-        kind=st.sampled_from(["insert", "insert", "remove", "move", "swap"]),
-        first=st.integers(0, tasks - 1),
-        second=st.integers(0, tasks - 1),
-        level=st.sampled_from(LEVELS),
-        duration=durations,
-        profile=st.sampled_from(["quintic", "cubic", "half-sine", "tanh"]),
+KINDS = ("insert", "insert", "remove", "move", "move", "swap")
+PROFILES = ("quintic", "cubic", "half-sine", "tanh")
+
+
+def programs(shortest, longest, sizes=(4, 14), tasks=7):
+    """Programs from seeds: hypothesis, left alone, prefers short ones with little overlap."""
+    return st.builds(
+        lambda seed, size: _program(np.random.default_rng(seed), size, shortest, longest, tasks),
+        st.integers(0, 2**32 - 1),
+        st.integers(*sizes),
     )
-    return st.lists(step, min_size=sizes[0], max_size=sizes[1])
+
+
+def _program(rng, size, shortest, longest, tasks):
+    # Often the same few tasks, so that requests meet tasks on their way.
+    favourites = rng.choice(tasks, 2)
+    return [
+        Step(
+            wait=int(rng.integers(0, 8)),
+            kind=str(rng.choice(KINDS)),
+            first=int(rng.choice(favourites) if rng.random() < 0.5 else rng.integers(tasks)),
+            second=int(rng.integers(tasks)),
+            level=float(rng.choice(LEVELS)),
+            duration=float(np.exp(rng.uniform(np.log(shortest), np.log(longest)))),
+            profile=str(rng.choice(PROFILES)),
+        )
+        for _ in range(size)
+    ]
 
 
 class Program:

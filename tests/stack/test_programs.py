@@ -1,11 +1,8 @@
 """Random programs at one state: continuity, and every task exactly where it should be."""
 
-from itertools import combinations
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from opspace.law import TaskSet, Weighted, blended_torque
 from opspace.stack import Stack, mixture
@@ -88,10 +85,7 @@ class StepBound:
             for v in [*values, *(v for v in self.values if v not in values)]
         )
         if self.values:
-            gap = max(
-                (np.abs(a - b).max() for a, b in combinations([*hards, *self.hards], 2)),
-                default=0.0,
-            )
+            gap = np.ptp([*hards, *self.hards], axis=0).max()
             step = np.abs(taus[-1] - taus[-2]).max()
             assert step <= moved * gap + 1e-9 * (1.0 + np.abs(taus[-1]).max())
         self.values, self.hards = values, hards
@@ -115,14 +109,9 @@ def no_task_lost_or_twice(t, members, mixed, where, weights, hards, taus):
         assert sum(share for _, share in shares) == pytest.approx(1.0, abs=1e-12)
 
 
-# The shortest are over within a tick.
-ANY = st.one_of(st.just(0.001), st.floats(0.02, 0.4))
-SMOOTH = st.floats(0.15, 0.5)
-
-
 @pytest.mark.parametrize("blending", ["idv", "chain"])
-@settings(max_examples=50)
-@given(steps=programs(ANY))
+@settings(max_examples=30)
+@given(steps=programs(0.002, 0.4))
 def test_a_step_is_at_most_what_the_activations_allow(bench, blending, steps):
     bound = StepBound()
 
@@ -137,7 +126,7 @@ def test_a_step_is_at_most_what_the_activations_allow(bench, blending, steps):
 
 @pytest.mark.parametrize("blending", ["idv", "chain"])
 @settings(max_examples=12)
-@given(steps=programs(SMOOTH))
+@given(steps=programs(0.15, 0.5))
 def test_halving_the_tick_halves_the_largest_step(bench, blending, steps):
     coarse, fine = (
         np.abs(np.diff(run(bench, steps, blending, n)[0], axis=0)).max() for n in (1, 2)
@@ -149,8 +138,8 @@ def test_the_programs_do_overlap(bench):
     """What the two tests above draw from is not tame."""
     most = []
 
-    @settings(max_examples=25, database=None, derandomize=True)
-    @given(steps=programs(ANY))
+    @settings(max_examples=20, database=None, derandomize=True)
+    @given(steps=programs(0.002, 0.4))
     def play(steps):
         bound = StepBound()
         run(bench, steps, "chain", check=bound)
@@ -166,6 +155,12 @@ EVENTS = {
     "move": lambda stack, tasks: stack.move("posture", -1, 0.2),
     "swap": lambda stack, tasks: stack.swap("height", "posture", 0.2),
 }
+TURNS = {
+    "insert": lambda stack, tasks: stack.remove(tasks[2], 0.1),
+    "remove": lambda stack, tasks: stack.insert(tasks[0], 2.0, 0.1),
+    "move": lambda stack, tasks: stack.move("posture", 0.5, 0.1),
+    "swap": lambda stack, tasks: stack.swap("height", "posture", 0.1),
+}
 
 
 @pytest.mark.parametrize("event", EVENTS)
@@ -176,15 +171,10 @@ def test_nothing_steps_at_the_edges(bench, event, turned):
     dt, taus = 0.0005, []
     for tick in range(900):
         t = tick * dt
-        if tick == 100 or (turned and tick == 330):
+        if tick == 100:
             EVENTS[event](stack, bench.tasks)
-        if turned and tick == 270 and event in ("insert", "remove", "move"):
-            back = {
-                "insert": lambda: stack.remove(bench.tasks[2], 0.1),
-                "remove": lambda: stack.insert(bench.tasks[0], 0.0, 0.1),
-                "move": lambda: stack.move("posture", 1.0, 0.1),
-            }
-            back[event]()
+        if turned and tick == 270:
+            TURNS[event](stack, bench.tasks)
         members = stack.begin_tick(t)
         mixed = mixture(members, [m.presence.value(t) for m in members], t, "idv")
         taus.append(
