@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import os
 import sys
@@ -45,6 +46,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
         SystemExit: Always; 0 when the command did what was asked, 2 for bad input, 130 after
             Ctrl-C.
     """
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            # A terminal that knows no "·" shows something else in its place.
+            stream.reconfigure(errors="replace")
     status = _status(arguments)
     try:
         sys.stdout.flush()

@@ -261,6 +261,15 @@ def test_bad_options_are_refused(robot):
         Controller(robot, Stack([PositionTask("tol")]))
 
 
+def test_mixed_up_arguments_are_refused(robot):
+    with pytest.raises(InputError, match="takes a Stack, not list"):
+        Controller(robot, [PositionTask()])  # type: ignore[arg-type]
+    with pytest.raises(InputError, match="takes a robot, not str"):
+        Controller("puma560", Stack([PositionTask()]))  # type: ignore[arg-type]
+    with pytest.raises(InputError, match="a list of tasks"):
+        Stack(PositionTask())  # type: ignore[arg-type]
+
+
 def test_bad_stacks_are_refused():
     with pytest.raises(InputError, match="two tasks are named 'position'"):
         Stack([PositionTask(), PositionTask()])

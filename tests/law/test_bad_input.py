@@ -90,3 +90,10 @@ def test_every_error_is_an_opspace_error():
     assert issubclass(InputError, OpspaceError)
     assert issubclass(InputError, ValueError)
     assert issubclass(UnknownNameError, OpspaceError)
+
+
+def test_too_many_task_sets_moving_at_once_point_to_the_chain():
+    many = [GOOD.replace(activation=0.5)] * 17
+    with pytest.raises(InputError, match=r"2\^17 hard torques, use blending='chain'"):
+        task_torque(np.eye(3), many)
+    assert np.all(np.isfinite(task_torque(np.eye(3), many, "chain")))

@@ -21,6 +21,7 @@ from opspace.errors import InputError, unknown_name
 from opspace.law import (
     BLENDINGS,
     LawInfo,
+    Profile,
     TaskSet,
     Weighted,
     blended_torque,
@@ -74,7 +75,17 @@ class Controller:
             raise unknown_name("bias", bias, BIASES)
         if not (math.isfinite(damping) and damping >= 0.0):
             raise InputError(f"damping must be finite and >= 0 1/s, got {damping}")
+        if not isinstance(stack, Stack):
+            raise InputError(
+                f"a controller takes a Stack, not {type(stack).__name__}: Stack([task, ...])"
+            )
+        if not isinstance(robot, Robot):
+            raise InputError(
+                f"a controller takes a robot, not {type(robot).__name__}: load_robot(name)"
+            )
         check_drivable(robot)
+        if stack.limits is not None:
+            Profile(stack.limits.profile)
         self.robot = robot
         self.stack = stack
         self.blending = blending

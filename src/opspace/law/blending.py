@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from opspace.errors import unknown_name
+from opspace.errors import InputError, unknown_name
 
 
 class Weighted(NamedTuple):
@@ -18,6 +18,9 @@ class Weighted(NamedTuple):
     weight: float
     present: frozenset[int]
 
+
+MOST_MOVING = 16
+"""More task sets than this cannot move at once with ``idv``: 2^16 hard torques take seconds."""
 
 BLENDINGS = ("idv", "chain")
 """``idv``: intermediate desired values, 2^k corners. ``chain``: k + 1 corners."""
@@ -39,12 +42,18 @@ def corners(activations: Sequence[float], blending: str) -> list[Weighted]:
 
     Raises:
         UnknownNameError: There is no such blending.
+        InputError: More than `MOST_MOVING` task sets move with ``"idv"``.
     """
     if blending not in BLENDINGS:
         raise unknown_name("blending", blending, BLENDINGS)
     always = frozenset(k for k, h in enumerate(activations) if h == 1.0)
     moving = [k for k, h in enumerate(activations) if 0.0 < h < 1.0]
     if blending == "idv":
+        if len(moving) > MOST_MOVING:
+            raise InputError(
+                f"{len(moving)} task sets have an activation between 0 and 1; blending='idv' would "
+                f"take 2^{len(moving)} hard torques, use blending='chain' (at most {MOST_MOVING})"
+            )
         return _idv_corners(activations, always, moving)
     return _chain_corners(activations, always, moving)
 

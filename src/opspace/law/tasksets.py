@@ -3,7 +3,7 @@
 # J, M and R are the paper's matrices, not constants; jaxtyping leaves NumPy's type parameters open.
 # pyright: strict, reportConstantRedefinition=false, reportUnknownMemberType=false
 # pyright: reportUnknownVariableType=false, reportUnknownArgumentType=false
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -123,6 +123,20 @@ def check_inertia(M: ArrayLike) -> tuple[Float[np.ndarray, "n n"], Float[np.ndar
             f"inertia M must be positive definite; its smallest eigenvalue is {smallest:.3g}"
         ) from None
     return M, L
+
+
+def as_list(tasks: Iterable[TaskSet]) -> list[TaskSet]:
+    """Collect task sets.
+
+    Raises:
+        InputError: It is not a list of anything.
+    """
+    try:
+        return list(tasks)
+    except TypeError:
+        raise InputError(
+            f"task sets come in a list, got a {type(tasks).__name__}: [TaskSet(...), ...]"
+        ) from None
 
 
 def check_tasks(tasks: Sequence[TaskSet], n: int) -> None:

@@ -16,7 +16,7 @@ from opspace.law.blending import BLENDINGS, Weighted, corners
 from opspace.law.hierarchy import hard_law, levels_of, whiten
 from opspace.law.recursion import Recursion, law_recursion
 from opspace.law.singularity import SigmaBuffer
-from opspace.law.tasksets import TaskSet, check_inertia, check_tasks
+from opspace.law.tasksets import TaskSet, as_list, check_inertia, check_tasks
 from opspace.law.tree import LevelReport, Walk
 
 COUPLINGS = ("compensated", "as-printed")
@@ -105,7 +105,7 @@ def task_torque(
         "A Continuous Task Transition Algorithm for Operational Space Control Framework", Eq. 8-23.
     """
     M, L = check_inertia(M)
-    tasks = list(tasks)
+    tasks = as_list(tasks)
     check_tasks(tasks, M.shape[0])
     if coupling not in COUPLINGS:
         raise unknown_name("coupling", coupling, COUPLINGS)
@@ -212,7 +212,7 @@ def intermediate_values(
             that is not a torque.
         UnknownNameError: There is no such blending.
     """
-    tasks = list(tasks)
+    tasks = as_list(tasks)
     activations = [task.activation for task in tasks]
     if callable(M_or_solve):
         if M is None:

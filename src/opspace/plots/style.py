@@ -12,6 +12,8 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import to_hex, to_rgb
 from matplotlib.figure import Figure
 
+from opspace.errors import InputError
+
 WIDTH = 9.0
 """Width of a figure [in]: 1350 pixels, for a page that shows it 900 wide."""
 
@@ -109,8 +111,16 @@ def save(figure: Figure, path: Path | str) -> Path:
 
     Returns:
         The path.
+
+    Raises:
+        InputError: The file does not end in .png or cannot be written.
     """
     path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(path, dpi=DPI, metadata={"Software": None})
+    if path.suffix != ".png":
+        raise InputError(f"{path}: a figure is a .png file")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        figure.savefig(path, dpi=DPI, metadata={"Software": None})
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written: {error.strerror}") from None
     return path

@@ -9,7 +9,7 @@ from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from pathlib import Path
 
-from opspace.errors import ModelError
+from opspace.errors import ModelError, missing_extra
 from opspace.robots.description import Description
 from opspace.robots.protocol import Robot
 from opspace.robots.urdf import describe_urdf, read_urdf
@@ -46,13 +46,20 @@ def read_robot(
 
     Raises:
         ModelError: The file does not exist, cannot be used, or has nothing that moves.
+        MissingExtraError: MuJoCo is needed and not installed.
     """
     if not path.is_file():
         raise ModelError(f"{path}: no such file")
     if path.suffix not in SUFFIXES:
         raise ModelError(f"{path}: a robot file ends in {' or '.join(SUFFIXES)}")
     read = _read_urdf if path.suffix == ".urdf" else _read_mjcf
-    robot = read(path, backend, floating_base, locked_joints)
+    try:
+        robot = read(path, backend, floating_base, locked_joints)
+    except ModuleNotFoundError as error:
+        if error.name != "mujoco":
+            raise
+        # It also reads MJCF for Pinocchio, so that both see the same model.
+        raise missing_extra("mujoco", "sim") from None
     if robot.description.nv == 0:
         raise ModelError(f"{path}: the robot has no joint that moves")
     return robot

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
@@ -9,6 +10,7 @@ from typing import Protocol
 import numpy as np
 
 from opspace.controller import Command, Controller
+from opspace.errors import InputError
 from opspace.sim.plant import Plant
 
 
@@ -80,7 +82,12 @@ def simulate(
 
     Returns:
         How the run ended.
+
+    Raises:
+        InputError: The duration is not a time.
     """
+    if not (math.isfinite(duration) and duration >= 0.0):
+        raise InputError(f"the duration must be finite and >= 0 s, got {duration}")
     joints = controller.robot.joint_names
     start = plant.t
     t = start

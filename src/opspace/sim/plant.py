@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -47,6 +48,8 @@ class Plant:
         friction: bool = False,
         torque_limits: bool = True,
     ) -> None:
+        if not (math.isfinite(dt) and dt > 0.0):
+            raise InputError(f"the time step must be above 0 s, got {dt}")
         mujoco = _import_mujoco()
         from opspace.robots.mujoco_model import mujoco_model  # noqa: PLC0415 - imports mujoco
 

@@ -46,6 +46,8 @@ class Stack:
     """
 
     def __init__(self, levels: Sequence[Task | JointLimits | Sequence[Task]]) -> None:
+        if isinstance(levels, Task | JointLimits):
+            raise InputError(f"a stack takes a list of tasks: Stack([{levels!r}])")
         self.limits: JointLimits | None = None
         self._transitions = Transitions()
         number = 0

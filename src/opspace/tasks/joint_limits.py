@@ -139,7 +139,7 @@ class JointLimits:
 
     def margin(self, side: Side) -> float:
         """Width of the activation's rise on the acceleration, rad/s² or m/s²."""
-        return 0.75 * side.brake
+        return 0.25 * side.brake
 
     def admissible(self, side: Side, position: float, speed: float) -> float:
         """Largest acceleration towards a limit from which the joint still stops at it.
