@@ -62,8 +62,9 @@ class JointLimits:
     In mode ``admissible`` a joint gets the smaller of q̈_adm and a_other, its acceleration under
     the stack without this limit: the task set asks for min(a_other, q̈_adm), with the activation
     h = profile((a_other − (q̈_adm − margin)) / margin). While a_other is the smaller, inserting a
-    task set that asks for what happens anyway changes nothing, so the torque is continuous, the
-    whole range is usable, and the limit only ever pushes inwards and lets go by itself.
+    task set that asks for what happens anyway changes nothing, so the whole range is usable, and
+    the limit only ever pushes inwards and lets go by itself. The activation is for the levels
+    below: their singular directions see the inserted row.
 
     In mode ``buffer`` the activation rises with the position, from 0 at the inner edge of the buffer
     to 1 at the limit (Section 4.2, Fig. 7), and the task set pulls back to the inner edge; a target
