@@ -158,7 +158,7 @@ def run(
     from opspace.scenario import load_scenario
     from opspace.scenario.progress import ProgressBar
     from opspace.scenario.run import run_scenario
-    from opspace.scenario.tables import metrics_table
+    from opspace.scenario.tables import metrics_table, timeline_table
 
     loaded = load_scenario(scenario, overrides or ())
     out = out or Path("results") / Path(scenario).stem
@@ -166,6 +166,9 @@ def run(
         result = run_scenario(
             loaded, out, title=Path(scenario).stem, progress=progress, overwrite=overwrite
         )
+    if loaded.events:
+        _print_table(*timeline_table(loaded.events, result.recording))
+        print()
     _print_table(*metrics_table({"value": result.metrics}))
     if not result.outcome.completed:
         print(f"stopped at {result.outcome.t:.3f} s: {result.outcome.reason}")

@@ -95,6 +95,11 @@ plant:
 stop:
   max_joint_speed: 20
   max_torque: 500
+events:
+  - {at: 0.1, insert: rest, level: 7.5, duration: 0.2, profile: cubic}
+  - {at: 0.2, move: rest, level: -1}
+  - {at: 0.2, swap: [rest, reach]}
+  - {at: 0.3, remove: wrist}
 """
 
 numbers = st.floats(-1e3, 1e3)

@@ -212,6 +212,18 @@ MISTAKES = [
     ("  max_torque: 500", "  max_torque: !!int x", "stop.max_torque", "cannot be read as int"),
     ("  max_torque: 500", "  ? [1]\n  : 2", "stop", "not plain text"),
     ("  max_torque: 500", "---\na: 1", "", "another document"),
+    ("remove: wrist", "remove: wrsit", "events[3]", "unknown task 'wrsit'; did you mean 'wrist'"),
+    (
+        "remove: wrist",
+        "level: 1",
+        "events[3]",
+        "exactly one of insert, remove, move, swap, not none",
+    ),
+    ("remove: wrist", "remove: wrist, move: rest", "events[3]", "not remove and move"),
+    ("remove: wrist", "remove: wrist, level: 1", "events[3].level", "remove takes no level"),
+    ("move: rest, level: -1", "move: rest", "events[1].level", "is missing (number of the level"),
+    ("swap: [rest, reach]", "swap: [rest, rest]", "events[2].swap", "two different tasks"),
+    ("at: 0.3", "at: -1", "events[3].at", "at least 0 [s], not -1"),
     ("  max_torque: 500", "  max_torque: \x07", "", "special characters"),
 ]
 

@@ -16,17 +16,23 @@ from opspace.tasks import Task
 _NOTHING = np.zeros(0)
 
 
-def columns_of(controller: Controller, tasks: Sequence[Task] = ()) -> list[Column]:
+def columns_of(
+    controller: Controller,
+    tasks: Sequence[Task] = (),
+    levels: Mapping[float, Sequence[Task]] | None = None,
+) -> list[Column]:
     """List the columns of a controller's recording, in the order of `TickRecorder`'s rows.
 
     Args:
         controller: The controller that will be recorded.
         tasks: Prepared tasks that will be in its stack later.
+        levels: Tasks that may be at each level, by its number; None takes those of the stack.
 
     Returns:
         Columns with names, units and descriptions.
     """
     robot, stack = controller.robot, controller.stack
+    levels = stack.levels_by_number if levels is None else levels
     columns = [Column("t", "s", "time")]
     for group, unit, what in (
         ("q", "rad", "joint position"),
@@ -41,7 +47,7 @@ def columns_of(controller: Controller, tasks: Sequence[Task] = ()) -> list[Colum
             Column(f"tasks/{task.name}/error/{i}", unit, f"row {i}: desired minus actual")
             for i, unit in enumerate(task.units)
         ]
-    for number, level in stack.levels_by_number.items():
+    for number, level in levels.items():
         size, prefix = _directions(controller, level), f"levels/{number:g}"
         names = ", ".join(task.name for task in level)
         columns += [
@@ -67,16 +73,17 @@ def columns_of(controller: Controller, tasks: Sequence[Task] = ()) -> list[Colum
 class TickRecorder:
     """Record a run: one row per tick, on disk before the plant advances.
 
-    The columns are those of the tasks and levels in the stack at the start, and of the tasks
-    declared here; they hold NaN while there is no such task or level. A task that is inserted
-    without having been declared is not recorded, nor is a level that is new. Of a level that
-    grows only as many directions are recorded as it had at the start, the strongest.
+    The columns are those of the tasks and levels in the stack at the start, and of the tasks and
+    levels declared here; they hold NaN while there is no such task or level. A task or a level
+    that appears without having been declared is not recorded, and of a level that grows beyond
+    what was declared only the strongest directions are.
 
     Args:
         directory: Where the recording is written.
         controller: The controller of the run.
         header: What the recording says about itself: scenario, seed, time step.
         tasks: Tasks that will be inserted later.
+        levels: Tasks that may ever be at each level, by its number; None takes those of the stack.
         overwrite: Replace a recording that is already there.
 
     Raises:
@@ -92,6 +99,7 @@ class TickRecorder:
         header: Mapping[str, object],
         *,
         tasks: Sequence[Task] = (),
+        levels: Mapping[float, Sequence[Task]] | None = None,
         overwrite: bool = False,
     ) -> None:
         stack = controller.stack
@@ -103,12 +111,10 @@ class TickRecorder:
         for name in names:
             if names.count(name) > 1:
                 raise InputError(f"two tasks to record are named {name!r}")
+        levels = stack.levels_by_number if levels is None else levels
         self._rows = {task.name: task.rows for task in [*stack, *tasks]}
-        self._levels = {
-            number: _directions(controller, level)
-            for number, level in stack.levels_by_number.items()
-        }
-        columns = columns_of(controller, tasks)
+        self._levels = {number: _directions(controller, level) for number, level in levels.items()}
+        columns = columns_of(controller, tasks, levels)
         self._recorder = Recorder(directory, columns, header, overwrite=overwrite)
 
     def observe(self, q: np.ndarray, v: np.ndarray, command: Command) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,6 +11,7 @@ from opspace.controller import Controller, Singularity
 from opspace.errors import OpspaceError, UnknownNameError
 from opspace.robots import Robot, load_robot
 from opspace.scenario.build_tasks import build_tasks, check_configuration, configuration
+from opspace.scenario.events import in_order, insertion_level, late_tasks
 from opspace.scenario.schema import Scenario
 from opspace.sim import Plant, StopRule
 from opspace.stack import Stack
@@ -26,7 +28,8 @@ class Built:
     Attributes:
         scenario: What it was built from.
         robot: The robot that the controller computes with.
-        stack: The tasks.
+        stack: The tasks, with the events of the scenario waiting in it.
+        tasks: Every task by name, those included that events insert.
         controller: The controller.
         plant: The simulated robot at the start of the run.
         stop: When the run is given up.
@@ -35,6 +38,7 @@ class Built:
     scenario: Scenario
     robot: Robot
     stack: Stack
+    tasks: Mapping[str, Task]
     controller: Controller
     plant: Plant
     stop: StopRule
@@ -57,7 +61,8 @@ def build(scenario: Scenario) -> Built:
     robot = build_robot(scenario)
     q = _start(scenario, robot)
     robot.update(q, np.zeros(robot.nv))
-    stack = Stack(_levels(scenario, robot))
+    tasks = build_tasks(scenario, robot)
+    stack = Stack(_levels(scenario, tasks), limits=_joint_limits(scenario))
     try:
         controller = Controller(
             robot,
@@ -68,6 +73,7 @@ def build(scenario: Scenario) -> Built:
         )
     except UnknownNameError as error:
         raise scenario.error(("joint_limits", "joints"), str(error)) from error
+    _schedule(scenario, stack, tasks)
     plant = Plant(
         robot,
         q,
@@ -76,7 +82,7 @@ def build(scenario: Scenario) -> Built:
         torque_limits=scenario.plant.torque_limits,
     )
     stop = StopRule(scenario.stop.max_joint_speed, scenario.stop.max_torque)
-    return Built(scenario, robot, stack, controller, plant, stop)
+    return Built(scenario, robot, stack, tasks, controller, plant, stop)
 
 
 def build_robot(scenario: Scenario) -> Robot:
@@ -108,13 +114,36 @@ def _start(scenario: Scenario, robot: Robot) -> np.ndarray:
         raise scenario.error(("start",), str(error)) from error
 
 
-def _levels(scenario: Scenario, robot: Robot) -> list[JointLimits | list[Task]]:
-    tasks = build_tasks(scenario, robot)
-    by_level: dict[int, list[Task]] = {}
+def _levels(scenario: Scenario, tasks: Mapping[str, Task]) -> dict[float, list[Task]]:
+    late = late_tasks(scenario.events)
+    by_level: dict[float, list[Task]] = {}
     for name, entry in scenario.tasks.items():
-        by_level.setdefault(entry.level, []).append(tasks[name])
-    limits = _joint_limits(scenario)
-    return [*([limits] if limits else []), *(by_level[level] for level in sorted(by_level))]
+        if name not in late:
+            by_level.setdefault(float(entry.level), []).append(tasks[name])
+    return by_level
+
+
+def _schedule(scenario: Scenario, stack: Stack, tasks: Mapping[str, Task]) -> None:
+    """Ask the stack for every event, to start at its time."""
+    for place, event in in_order(scenario.events):
+        smooth = scenario.method == "transition"
+        duration = event.duration if smooth else 0.0
+        profile = event.profile if smooth else SWITCH
+        first, last = tasks[event.tasks[0]], tasks[event.tasks[-1]]
+        try:
+            match event.kind:
+                case "insert":
+                    level = insertion_level(event, scenario.tasks)
+                    stack.insert(first, level, duration, profile=profile, start_time=event.at)
+                case "remove":
+                    stack.remove(first, duration, profile=profile, start_time=event.at)
+                case "move":
+                    assert event.level is not None
+                    stack.move(first, event.level, duration, profile=profile, start_time=event.at)
+                case "swap":
+                    stack.swap(first, last, duration, profile=profile, start_time=event.at)
+        except OpspaceError as error:
+            raise scenario.error(("events", place), str(error)) from error
 
 
 def _joint_limits(scenario: Scenario) -> JointLimits | None:

@@ -101,6 +101,23 @@ def measure(
     )
 
 
+def largest_torque_step(recording: Recording, start: float, end: float) -> float | None:
+    """Find the largest |Δtau| of any joint between two ticks while something happens.
+
+    Args:
+        recording: The run.
+        start: When it begins, s; the step into the first tick from then on counts.
+        end: When it is over, s; the step into the first tick from then on counts as well.
+
+    Returns:
+        N·m; None where the run was over before.
+    """
+    t = recording.t
+    first, last = np.searchsorted(t, [start, end], side="left")
+    # The tick times are sums of floats: one tick more on either side misses nothing.
+    return _largest(_torque_steps(recording)[max(first - 2, 0) : last + 1])
+
+
 def _torque_steps(recording: Recording) -> np.ndarray:
     """Return |Δtau| of each joint from tick to tick, (T - 1, n)."""
     # A diverged run ends with torques whose difference is not a number.

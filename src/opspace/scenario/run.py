@@ -9,6 +9,7 @@ from opspace.record import Recording, load
 from opspace.record.format import write_json
 from opspace.record.observer import TickRecorder
 from opspace.scenario.build import Built, build
+from opspace.scenario.events import late_tasks, levels_visited
 from opspace.scenario.load import dump_scenario, to_dict
 from opspace.scenario.metrics import Metrics, measure
 from opspace.scenario.progress import ProgressBar
@@ -63,7 +64,17 @@ def run_scenario(
     """
     built = build(scenario)
     header = {"scenario": to_dict(scenario), "seed": scenario.seed, "dt": scenario.dt}
-    recorder = TickRecorder(out, built.controller, header, overwrite=overwrite)
+    recorder = TickRecorder(
+        out,
+        built.controller,
+        header,
+        tasks=[built.tasks[name] for name in scenario.tasks if name in late_tasks(scenario.events)],
+        levels={
+            number: [built.tasks[name] for name in names]
+            for number, names in levels_visited(scenario.events, scenario.tasks).items()
+        },
+        overwrite=overwrite,
+    )
     (out / METRICS).unlink(missing_ok=True)
     (out / SCENARIO).write_text(dump_scenario(scenario), encoding="utf-8")
     line = progress.run(title, scenario.duration) if progress else None

@@ -5,19 +5,17 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Annotated, Literal
 
-from pydantic import Field, PrivateAttr, field_validator, model_validator
+from pydantic import Field, PrivateAttr, ValidationInfo, field_validator, model_validator
 
 from opspace.errors import ScenarioError
 from opspace.scenario.document import Document, Key, key_text
+from opspace.scenario.events import Event, ProfileName, check_events
 from opspace.scenario.fields import Checked, Entry, Quantity, problem, shown, whole
 from opspace.scenario.targets import Configuration
 from opspace.scenario.task_entries import AnyTask
 
 if TYPE_CHECKING:
     from typing_extensions import Self
-
-ProfileName = Literal["linear", "cubic", "quintic", "half-sine", "tanh", "step"]
-"""``step`` is the hard switch that all of this avoids, for comparisons."""
 
 
 class Singularity(Entry):
@@ -126,7 +124,8 @@ class Scenario(Entry):
     )
     method: Literal["transition", "switch", "none"] = Field(
         default="transition",
-        description="joint limits and singular directions fade, switch, or are not handled at all",
+        description="events, joint limits and singular directions fade or switch; with none events "
+        "switch and the others are not handled at all",
     )
     blending: Literal["idv", "chain"] = Field(
         default="idv", description="blend of simultaneous transitions: 2^k or k + 1 hard torques"
@@ -136,6 +135,9 @@ class Scenario(Entry):
         description="compensate gravity and Coriolis in every joint or in the tasks only",
     )
     tasks: dict[str, AnyTask] = Field(description="name: what the robot is asked for")
+    events: list[Event] = Field(
+        default_factory=list, description="changes of the stack while the robot moves, with times"
+    )
     joint_limits: JointLimits | None = Field(
         default_factory=JointLimits, description="joint limit avoidance; null is none"
     )
@@ -167,6 +169,13 @@ class Scenario(Entry):
         if self.dt > self.duration:
             raise problem(f"must not be longer than the duration, {self.duration:g} s", "dt")
         return self
+
+    @field_validator("events")
+    @classmethod
+    def _check_events(cls, events: list[Event], info: ValidationInfo) -> list[Event]:
+        if "tasks" in info.data:
+            check_events(events, info.data["tasks"])
+        return events
 
     def read_from(self, document: Document) -> Self:
         """Remember the document that this was read from, for ``error``."""

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from opspace.record import Recording
 from opspace.scenario.check import JointReport
-from opspace.scenario.metrics import UNITS, Metrics
+from opspace.scenario.events import Event, in_order
+from opspace.scenario.metrics import UNITS, Metrics, largest_torque_step
 
 
 def metrics_table(runs: Mapping[str, Metrics]) -> tuple[list[str], list[list[str]]]:
@@ -26,6 +28,29 @@ def metrics_table(runs: Mapping[str, Metrics]) -> tuple[list[str], list[list[str
                 [key.replace("_", " "), *map(_written, values), "" if unit == "1" else unit]
             )
     return ["", *numbers, "unit"], rows
+
+
+def timeline_table(
+    events: Sequence[Event], recording: Recording
+) -> tuple[list[str], list[list[str]]]:
+    """Write what happened to the stack and what it did to the torque, in order of time.
+
+    Args:
+        events: The events of the scenario.
+        recording: The run.
+
+    Returns:
+        Heads with units, and rows; the torque step is the largest of any joint between two ticks
+        from the beginning of the event to its end.
+    """
+    heads = ["from [s]", "to [s]", "event", "level", "largest torque step [N·m]"]
+    rows = []
+    for _, event in in_order(events):
+        what = f"{event.kind} {', '.join(event.tasks)}"
+        level = "-" if event.level is None else f"{event.level:g}"
+        step = largest_torque_step(recording, event.at, event.end)
+        rows.append([f"{event.at:.3f}", f"{event.end:.3f}", what, level, _written(step)])
+    return heads, rows
 
 
 def joints_table(joints: Sequence[JointReport]) -> tuple[list[str], list[list[str]]]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 
 from opspace.errors import InputError
 from opspace.stack.members import Member
@@ -39,28 +39,36 @@ class Stack:
     A stack belongs to one controller.
 
     Args:
-        levels: Tasks, lists of tasks, and at most one `JointLimits`.
+        levels: Tasks, lists of tasks, and at most one `JointLimits`; or a mapping from the number
+            of each level to its task or tasks.
+        limits: The joint limits, where they do not stand in the list.
 
     Raises:
         InputError: An entry that is no task, a name used twice, or more than one `JointLimits`.
     """
 
-    def __init__(self, levels: Sequence[Task | JointLimits | Sequence[Task]]) -> None:
+    def __init__(
+        self,
+        levels: Sequence[Task | JointLimits | Sequence[Task]]
+        | Mapping[float, Task | Sequence[Task]],
+        limits: JointLimits | None = None,
+    ) -> None:
         if isinstance(levels, Task | JointLimits):
             raise InputError(f"a stack takes a list of tasks: Stack([{levels!r}])")
-        self.limits: JointLimits | None = None
         self._transitions = Transitions()
-        number = 0
-        for entry in levels:
-            if isinstance(entry, JointLimits):
-                if self.limits is not None:
-                    raise InputError("a stack takes one JointLimits, which covers every joint")
-                self.limits = entry
-                continue
-            level = (entry,) if isinstance(entry, Task) else _as_level(entry)
-            for task in level:
-                self._transitions.start_with(task, float(number))
-            number += bool(level)
+        if isinstance(levels, Mapping):
+            numbered, listed = dict(levels), []
+        else:
+            numbered, listed = _numbered(levels)
+        given = [*listed, *([] if limits is None else [limits])]
+        if len(given) > 1:
+            raise InputError("a stack takes one JointLimits, which covers every joint")
+        self.limits: JointLimits | None = given[0] if given else None
+        for number, entry in sorted(
+            ((checked_level(n), entry) for n, entry in numbered.items()), key=lambda found: found[0]
+        ):
+            for task in (entry,) if isinstance(entry, Task) else _as_level(entry):
+                self._transitions.start_with(task, number)
 
     def __iter__(self) -> Iterator[Task]:
         """Iterate over the tasks, most important first."""
@@ -218,6 +226,16 @@ class Stack:
         For the controller's thread, once per tick.
         """
         return self._transitions.begin_tick(t)
+
+
+def _numbered(
+    levels: Sequence[Task | JointLimits | Sequence[Task]],
+) -> tuple[dict[float, tuple[Task, ...]], list[JointLimits]]:
+    """Number the levels of a list, and take the joint limits out of it."""
+    limits = [entry for entry in levels if isinstance(entry, JointLimits)]
+    rest = [entry for entry in levels if not isinstance(entry, JointLimits)]
+    tasks = [(entry,) if isinstance(entry, Task) else _as_level(entry) for entry in rest]
+    return {float(k): level for k, level in enumerate(filter(None, tasks))}, limits
 
 
 def _as_level(entry: object) -> tuple[Task, ...]:
