@@ -199,7 +199,12 @@ MISTAKES = [
     ("[-0.75, 0.75]", "[0.75, -0.75]", "joint_limits.joints.joint1", "[lower, upper]"),
     ("upper: 0.02", "upper: 0.001", "singularity.upper", "above lower, 0.01, not 0.001"),
     ("friction: true", "friction: yes", "plant.friction", "true or false, not 'yes'"),
-    ("blending: chain", "blending: chian", "blending", "did you mean 'chain'? (valid: idv, chain)"),
+    (
+        "blending: chain",
+        "blending: chian",
+        "blending",
+        "did you mean 'chain'? (valid: auto, idv, chain)",
+    ),
     ("duration: 1e1", "duration: 3601", "duration", "above 0 and at most 3600 [s], not 3601"),
     ("duration: 1e1", "duration: 1e-3", "dt", "not be longer than the duration, 0.001 s"),
     ("seed: 5", "seed: 5\nseed: 6", "seed", "given twice, first on line 7"),

@@ -8,7 +8,7 @@ from hypothesis import given
 
 from opspace import tasks
 from opspace.errors import ScenarioError, UnknownNameError
-from opspace.law import BLENDINGS, PROFILES
+from opspace.law import PROFILES
 from opspace.robots.registry import BACKENDS
 from opspace.scenario import (
     Scenario,
@@ -21,6 +21,7 @@ from opspace.scenario import (
     to_dict,
 )
 from opspace.scenario.document import parse
+from opspace.stack.blending import EXACT
 from tests.scenario.examples import EVERYTHING, scenarios
 
 TASKS = {
@@ -116,7 +117,7 @@ def choices(model, key):
 
 
 def test_choices_are_those_of_the_library():
-    assert choices(schema.Scenario, "blending") == BLENDINGS
+    assert choices(schema.Scenario, "blending") == tuple(EXACT)
     assert choices(schema.Scenario, "backend") == BACKENDS
     assert choices(schema.Singularity, "profile") == PROFILES
 

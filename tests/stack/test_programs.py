@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 
 from opspace.law import TaskSet, Weighted, blended_torque
-from opspace.stack import Stack, mixture
+from opspace.stack import Blending, Stack, mixture
 from tests.stack.arm import arm, state, tasks_for
 from tests.stack.programs import Program, programs, running_of, variables_of
 
@@ -51,6 +51,7 @@ def run(bench, steps, blending, ticks_per_wait=1, check=lambda *_: None):
     initial = {t.name: n for n, level in stack.levels_by_number.items() for t in level}
     program = Program(stack, tasks, steps, initial)
     dt = DT / ticks_per_wait
+    blending = Blending(blending)
     taus, members, tick = [], stack.begin_tick(0.0), 0
     while tick < 20 * ticks_per_wait or not (program.done and stack.settled):
         t = tick * dt
@@ -109,7 +110,7 @@ def no_task_lost_or_twice(t, members, mixed, where, weights, hards, taus):
         assert sum(share for _, share in shares) == pytest.approx(1.0, abs=1e-12)
 
 
-@pytest.mark.parametrize("blending", ["idv", "chain"])
+@pytest.mark.parametrize("blending", ["auto", "idv", "chain"])
 @settings(max_examples=30)
 @given(steps=programs(0.002, 0.4))
 def test_a_step_is_at_most_what_the_activations_allow(bench, blending, steps):
@@ -168,7 +169,7 @@ TURNS = {
 def test_nothing_steps_at_the_edges(bench, event, turned):
     """At start, turn and arrival the torque and its first two derivatives are continuous."""
     stack = Stack([bench.tasks[0], bench.tasks[6]])
-    dt, taus = 0.0005, []
+    dt, taus, blending = 0.0005, [], Blending("idv")
     for tick in range(900):
         t = tick * dt
         if tick == 100:
@@ -176,7 +177,7 @@ def test_nothing_steps_at_the_edges(bench, event, turned):
         if turned and tick == 270:
             TURNS[event](stack, bench.tasks)
         members = stack.begin_tick(t)
-        mixed = mixture(members, [m.presence.value(t) for m in members], t, "idv")
+        mixed = mixture(members, [m.presence.value(t) for m in members], t, blending)
         taus.append(
             sum(
                 w

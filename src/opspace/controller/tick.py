@@ -19,7 +19,6 @@ from opspace.controller.options import DEFAULT_SINGULARITY, Scales, Singularity,
 from opspace.controller.report import level_status, task_status
 from opspace.errors import InputError, unknown_name
 from opspace.law import (
-    BLENDINGS,
     LawInfo,
     Profile,
     TaskSet,
@@ -29,7 +28,7 @@ from opspace.law import (
     corners,
 )
 from opspace.robots.protocol import Robot
-from opspace.stack import Member, Mixture, Stack, mixture
+from opspace.stack import Blending, Member, Mixture, Stack, mixture
 from opspace.tasks import PostureTask, TaskTerms
 
 BIASES = ("joint", "task")
@@ -47,8 +46,11 @@ class Controller:
     Args:
         robot: The robot; the controller updates it at every tick.
         stack: The tasks; they may come, go and change rank while the controller runs.
-        blending: ``"idv"`` or ``"chain"`` for the tasks, see `opspace.task_torque`; joint limits,
-            of which many may act at once, are always blended by the chain.
+        blending: How tasks that move at once are blended. ``"auto"`` (default): intermediate
+            desired values while at most 3 move, the chain for those that begin to move beyond;
+            ``"idv"``: up to 16 exactly, 2^k hard torques; ``"chain"``: k + 1. See
+            `opspace.stack.Blending`. Joint limits, of which many may act at once, are always
+            blended by the chain.
         bias: ``"joint"`` (default) or ``"task"``, see `BIASES`.
         singularity: Buffer for singular directions; None switches their handling off.
         damping: Joint damping in the motions that no task uses, 1/s; also what a joint is braked
@@ -64,13 +66,12 @@ class Controller:
         robot: Robot,
         stack: Stack,
         *,
-        blending: str = "idv",
+        blending: str = "auto",
         bias: str = "joint",
         singularity: Singularity | None = DEFAULT_SINGULARITY,
         damping: float = 10.0,
     ) -> None:
-        if blending not in BLENDINGS:
-            raise unknown_name("blending", blending, BLENDINGS)
+        self._blending = Blending(blending)
         if bias not in BIASES:
             raise unknown_name("bias", bias, BIASES)
         if not (math.isfinite(damping) and damping >= 0.0):
@@ -88,7 +89,6 @@ class Controller:
             Profile(stack.limits.profile)
         self.robot = robot
         self.stack = stack
-        self.blending = blending
         self.bias = bias
         self.singularity = singularity
         self.damping = float(damping)
@@ -97,6 +97,11 @@ class Controller:
         self.calibration = self._scales.calibration(list(stack))
         if stack.limits is not None:
             stack.limits.bind(robot, self.calibration.brake)
+
+    @property
+    def blending(self) -> str:
+        """Name of the blending."""
+        return self._blending.name
 
     def step(self, t: float, q: ArrayLike, v: ArrayLike) -> Command:
         """Compute the torque for one state.
@@ -121,7 +126,7 @@ class Controller:
         members = self.stack.begin_tick(t)
         activations = [self._activation(member, t) for member in members]
         terms = [member.task.evaluate(robot, t) for member in members]
-        mixed = mixture(members, activations, t, self.blending)
+        mixed = mixture(members, activations, t, self._blending)
         task_sets, blend = self._task_sets(members, activations, terms, mixed)
         tau, info, limits = self._torque(task_sets, blend)
         levels = level_status(members, mixed, info, len(limits))

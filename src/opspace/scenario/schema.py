@@ -127,8 +127,10 @@ class Scenario(Entry):
         description="events, joint limits and singular directions fade or switch; with none events "
         "switch and the others are not handled at all",
     )
-    blending: Literal["idv", "chain"] = Field(
-        default="idv", description="blend of simultaneous transitions: 2^k or k + 1 hard torques"
+    blending: Literal["auto", "idv", "chain"] = Field(
+        default="auto",
+        description="blend of simultaneous transitions: idv for 3 and the chain beyond, "
+        "idv with 2^k hard torques, or chain with k + 1",
     )
     bias: Literal["joint", "task"] = Field(
         default="joint",

@@ -1,5 +1,6 @@
 """The tasks of a controller: who is in, at which level, and how that changes in time."""
 
+from opspace.stack.blending import Blending as Blending
 from opspace.stack.members import Member as Member
 from opspace.stack.mixture import Mixture as Mixture
 from opspace.stack.mixture import Slot as Slot

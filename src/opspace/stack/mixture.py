@@ -6,7 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from opspace.law import Weighted, corners
+from opspace.law import Weighted
+from opspace.stack.blending import Blending
 from opspace.stack.members import Member, Variable
 
 
@@ -44,7 +45,7 @@ class Mixture:
 
 
 def mixture(
-    members: Sequence[Member], activations: Sequence[float], t: float, blending: str
+    members: Sequence[Member], activations: Sequence[float], t: float, blending: Blending
 ) -> Mixture:
     """Blend the stacks between which the tasks of a stack are on their way.
 
@@ -56,21 +57,23 @@ def mixture(
         members: The tasks.
         activations: Activation of each.
         t: Time, s.
-        blending: ``"idv"`` or ``"chain"``.
+        blending: How they are blended; it remembers which activations are on their way.
 
     Returns:
         The stacks with weight > 0; those that are the same are one.
     """
     values = list(activations)
+    variables: list[object] = list(members)
     index: dict[Variable, int] = {}
     for member in members:
         for place in member.places:
             if place.arrival is not None and place.arrival not in index:
                 index[place.arrival] = len(values)
                 values.append(place.arrival.value(t))
+                variables.append(place.arrival)
     weights: dict[frozenset[Slot], float] = {}
     shares: list[dict[float, float]] = [{} for _ in members]
-    for weight, on in corners(values, blending):
+    for weight, on in blending.corners(variables, values):
         levels = [_level(member, index, on) for member in members]
         for found, level in zip(shares, levels, strict=True):
             found[level] = found.get(level, 0.0) + weight
