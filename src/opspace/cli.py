@@ -207,6 +207,38 @@ def reproduce(
     print(f"results: {out}")
 
 
+@app.command(epilog="Example: opspace compare showpiece --method opspace --method switch")
+def compare(
+    scenario: Annotated[
+        str, typer.Argument(help="A scenario file (.yaml), or the name of one that is shipped.")
+    ],
+    overrides: Overrides = None,
+    methods: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--method", metavar="NAME", help="One method; may be repeated. [default: all]"
+        ),
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Directory to write to. [default: results/compare/NAME]")
+    ] = None,
+) -> None:
+    """Run a scenario under other ways to change tasks: one table and one figure."""
+    from opspace.compare import METHODS, compare_scenario
+    from opspace.scenario import load_scenario
+    from opspace.scenario.progress import ProgressBar
+
+    out = out or Path("results") / "compare" / Path(scenario).stem
+    loaded = load_scenario(scenario, overrides or ())
+    with ProgressBar() as progress:
+        found = compare_scenario(loaded, methods or (), out, progress=progress)
+    _print_table(*found.table())
+    print()
+    for name in found.rows:
+        print(f"{name}: {METHODS[name].title} ({METHODS[name].limits})")
+    print(f"results: {out}")
+
+
 @app.command(epilog="Example: opspace check ur5")
 def check(
     robot: Annotated[str, typer.Argument(help="Name of a robot, or path of a .urdf or .xml file.")],

@@ -225,8 +225,14 @@ class Controller:
             corners([task.activation for task in limits], "chain"),
             [Weighted(w, frozenset(first + k for k in present)) for w, present in blend],
         )
-        tau, info = blended_torque(L, sets, everything, self._scales.buffer, want_spectra=True)
+        tau, info = self._blend(L, sets, everything)
         return (tau if self.bias == "task" else tau + robot.bias), info
+
+    def _blend(
+        self, L: np.ndarray, sets: Sequence[TaskSet], blend: Sequence[Weighted]
+    ) -> tuple[np.ndarray, LawInfo]:
+        """The sum of hard torques; another law may stand here to be compared with."""
+        return blended_torque(L, sets, blend, self._scales.buffer, want_spectra=True)
 
     def _acceleration(self, tau: np.ndarray) -> np.ndarray:
         """Joint accelerations that a torque causes, q̈ = A⁻¹ (Γ − b − g) (Eq. 1)."""

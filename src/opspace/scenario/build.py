@@ -44,11 +44,12 @@ class Built:
     stop: StopRule
 
 
-def build(scenario: Scenario) -> Built:
+def build(scenario: Scenario, controller: type[Controller] = Controller) -> Built:
     """Build what a scenario describes.
 
     Args:
         scenario: The scenario.
+        controller: Class of the controller.
 
     Returns:
         The objects.
@@ -64,7 +65,7 @@ def build(scenario: Scenario) -> Built:
     tasks = build_tasks(scenario, robot)
     stack = Stack(_levels(scenario, tasks), limits=_joint_limits(scenario))
     try:
-        controller = Controller(
+        driver = controller(
             robot,
             stack,
             blending=scenario.blending,
@@ -82,7 +83,7 @@ def build(scenario: Scenario) -> Built:
         torque_limits=scenario.plant.torque_limits,
     )
     stop = StopRule(scenario.stop.max_joint_speed, scenario.stop.max_torque)
-    return Built(scenario, robot, stack, tasks, controller, plant, stop)
+    return Built(scenario, robot, stack, tasks, driver, plant, stop)
 
 
 def build_robot(scenario: Scenario) -> Robot:

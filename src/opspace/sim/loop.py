@@ -9,8 +9,9 @@ from typing import Protocol
 
 import numpy as np
 
-from opspace.controller import Command, Controller
+from opspace.controller import Command
 from opspace.errors import InputError
+from opspace.robots.protocol import Robot
 from opspace.sim.plant import Plant
 
 
@@ -19,6 +20,19 @@ class Observer(Protocol):
 
     def observe(self, q: np.ndarray, v: np.ndarray, command: Command) -> None:
         """See one tick: the state, and the command computed for it."""
+        ...
+
+
+class Stepping(Protocol):
+    """What the loop needs of a controller."""
+
+    @property
+    def robot(self) -> Robot:
+        """The robot that it computes with."""
+        ...
+
+    def step(self, t: float, q: np.ndarray, v: np.ndarray) -> Command:
+        """See `opspace.Controller.step`."""
         ...
 
 
@@ -64,7 +78,7 @@ class Outcome:
 
 def simulate(
     plant: Plant,
-    controller: Controller,
+    controller: Stepping,
     duration: float,
     observers: Sequence[Observer] = (),
     stop: StopRule = StopRule(),

@@ -1,0 +1,116 @@
+"""Controllers that change tasks in other ways; tasks, gains, bias and references are the same."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from opspace.compare.blendings import CrossFade, Present
+from opspace.compare.laws import (
+    continuous_inverse,
+    damped_inverse,
+    presences,
+    stack_of_tasks,
+    weighted_least_squares,
+)
+from opspace.controller import Command, Controller
+from opspace.law import LawInfo, TaskSet, Weighted, task_torque
+from opspace.stack import Member, Mixture
+from opspace.tasks import TaskTerms
+
+MAX_RATE = 1000.0
+"""Torque rate that the clamp lets through, N·m/s: 1 N·m per millisecond."""
+
+
+class CrossFadeController(Controller):
+    """Linear cross-fade between the hard torques before and after each change."""
+
+    def __init__(self, *args: Any, **options: Any) -> None:
+        super().__init__(*args, **options)
+        self._blending = CrossFade()
+
+
+class GainRampController(Controller):
+    """A task takes its directions at once; only the acceleration that it asks for fades."""
+
+    def __init__(self, *args: Any, **options: Any) -> None:
+        super().__init__(*args, **options)
+        self._blending = Present()
+
+    def _task_sets(
+        self,
+        members: Sequence[Member],
+        activations: Sequence[float],
+        terms: Sequence[TaskTerms],
+        mixed: Mixture,
+    ) -> tuple[list[TaskSet], Sequence[Weighted]]:
+        faded = [
+            replace(term, acceleration=h * term.acceleration)
+            for h, term in zip(activations, terms, strict=True)
+        ]
+        return super()._task_sets(members, activations, faded, mixed)
+
+
+class SoftWeightsController(Controller):
+    """Weights in one least-squares problem instead of priorities; weights fade."""
+
+    def _blend(
+        self, L: np.ndarray, sets: Sequence[TaskSet], blend: Sequence[Weighted]
+    ) -> tuple[np.ndarray, LawInfo]:
+        return weighted_least_squares(L, sets, presences(blend, len(sets))), LawInfo(1, 1, ())
+
+
+class ContinuousInverseController(Controller):
+    """Mansard's continuous inverse at every level."""
+
+    def _blend(
+        self, L: np.ndarray, sets: Sequence[TaskSet], blend: Sequence[Weighted]
+    ) -> tuple[np.ndarray, LawInfo]:
+        presence = presences(blend, len(sets))
+        tau = stack_of_tasks(L, sets, presence, continuous_inverse)
+        return tau, LawInfo(1, len({task.priority for task in sets}), ())
+
+
+class DampedController(Controller):
+    """Damped least squares at every level, for tasks that switch."""
+
+    def _blend(
+        self, L: np.ndarray, sets: Sequence[TaskSet], blend: Sequence[Weighted]
+    ) -> tuple[np.ndarray, LawInfo]:
+        presence = presences(blend, len(sets))
+        tau = stack_of_tasks(L, sets, presence, damped_inverse)
+        return tau, LawInfo(1, len({task.priority for task in sets}), ())
+
+
+class AsPrintedController(Controller):
+    """Eq. 15-23 to the letter, without the term that subtracts what higher levels do."""
+
+    def _blend(
+        self, L: np.ndarray, sets: Sequence[TaskSet], blend: Sequence[Weighted]
+    ) -> tuple[np.ndarray, LawInfo]:
+        presence = presences(blend, len(sets))
+        active = [task.replace(activation=h) for task, h in zip(sets, presence, strict=True)]
+        return task_torque(L @ L.T, active, coupling="as-printed", info=True)
+
+
+class RateClampController(Controller):
+    """Whatever the controller commands, the torque changes by at most 1 N·m per millisecond."""
+
+    def __init__(self, *args: Any, **options: Any) -> None:
+        super().__init__(*args, **options)
+        self._sent: tuple[float, np.ndarray] | None = None
+
+    def step(self, t: float, q: ArrayLike, v: ArrayLike) -> Command:
+        """See `opspace.Controller.step`."""
+        command = super().step(t, q, v)
+        tau = command.tau
+        if self._sent is not None:
+            before, sent = self._sent
+            most = MAX_RATE * (command.t - before)
+            tau = sent + np.clip(tau - sent, -most, most)
+        self._sent = command.t, tau
+        return replace(command, tau=tau)

@@ -1,0 +1,88 @@
+"""The ways to change tasks, by name."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import Any
+
+from opspace.compare import controllers as others
+from opspace.controller import Controller
+from opspace.scenario import Scenario
+
+
+@dataclass(frozen=True)
+class Method:
+    """One way to change tasks.
+
+    Attributes:
+        title: What it does.
+        limits: What it does near joint limits and singular directions.
+        controller: Class of the controller.
+        changes: What it changes in a scenario.
+        profile: Profile of every event; None leaves them as they are.
+    """
+
+    title: str
+    limits: str
+    controller: type[Controller] = Controller
+    changes: Mapping[str, Any] = field(default_factory=dict[str, Any])
+    profile: str | None = None
+
+    def scenario(self, scenario: Scenario) -> Scenario:
+        """Write down what this method runs in place of a scenario."""
+        changes = dict(self.changes)
+        if self.profile is not None:
+            profile = {"profile": self.profile}
+            changes["events"] = [event.model_copy(update=profile) for event in scenario.events]
+        return scenario.model_copy(update=changes)
+
+
+_FADE, _SWITCH = "both fade", "both switch"
+_NO_BUFFER = "joint limits fade; no sigma buffer"
+
+METHODS: Mapping[str, Method] = MappingProxyType(
+    {
+        "opspace": Method("intermediate desired values, the library's default", _FADE),
+        "chain": Method("chain blending, k + 1 hard torques", _FADE, changes={"blending": "chain"}),
+        "switch": Method("hard switch", _SWITCH, changes={"method": "switch"}),
+        "cross-fade": Method(
+            "linear cross-fade of the hard torques before and after each change",
+            _FADE,
+            others.CrossFadeController,
+            profile="linear",
+        ),
+        "gain-ramp": Method(
+            "gains ramped from and to zero; the task's directions are taken at once",
+            _FADE,
+            others.GainRampController,
+        ),
+        "soft-weights": Method(
+            "weighted least squares, weights ramped; 100 to 1 from level to level",
+            _NO_BUFFER,
+            others.SoftWeightsController,
+        ),
+        "continuous-inverse": Method(
+            "Mansard's continuous inverse at every level",
+            _NO_BUFFER,
+            others.ContinuousInverseController,
+        ),
+        "damped": Method(
+            "hard switch, damped least squares",
+            "joint limits switch; damping near singularities",
+            others.DampedController,
+            {"method": "switch"},
+        ),
+        "rate-clamp": Method(
+            "hard switch, torque clamped to 1 N·m per ms",
+            _SWITCH,
+            others.RateClampController,
+            {"method": "switch"},
+        ),
+        "as-printed": Method(
+            "the paper's Eq. 15-23 to the letter", _NO_BUFFER, others.AsPrintedController
+        ),
+    }
+)
+"""Every method by name, the library's own first."""

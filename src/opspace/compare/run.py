@@ -1,0 +1,119 @@
+"""Runs one scenario under several methods."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from opspace.compare.measures import Measures, Timed, Watch, measure
+from opspace.compare.methods import METHODS
+from opspace.errors import unknown_name
+from opspace.plots import save
+from opspace.plots.comparison import comparison_figure
+from opspace.record.format import write_json
+from opspace.scenario import Scenario
+from opspace.scenario.build import build
+from opspace.scenario.load import to_dict
+from opspace.scenario.progress import ProgressBar
+from opspace.sim import simulate
+
+COLUMNS: Mapping[str, tuple[str, str]] = {
+    "torque_step": ("torque step", "N·m"),
+    "torque_step_outside": ("away from changes", "N·m"),
+    "acceleration": ("acceleration", "rad/s²"),
+    "jerk": ("its rate", "rad/s³"),
+    "error_inside": ("error in changes", "m, rad"),
+    "error_outside": ("error outside", "m, rad"),
+    "leak": ("priority leak", "m/s², rad/s²"),
+    "overshoot": ("beyond limits", "rad"),
+    "tick": ("tick", "µs"),
+}
+"""Head and unit of each measure."""
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """A scenario under several methods.
+
+    Attributes:
+        scenario: What was run.
+        rows: Measures by name of the method.
+    """
+
+    scenario: Scenario
+    rows: Mapping[str, Measures]
+
+    def to_json(self) -> dict[str, Any]:
+        """Return everything as plain values."""
+        return {
+            "scenario": to_dict(self.scenario),
+            "methods": {name: asdict(row) for name, row in self.rows.items()},
+        }
+
+    def table(self) -> tuple[list[str], list[list[str]]]:
+        """Write the measures, one row per method.
+
+        Returns:
+            Heads with units, and rows.
+        """
+        heads = ["method", *(f"{head} [{unit}]" for head, unit in COLUMNS.values()), "run"]
+        rows = []
+        for name, row in self.rows.items():
+            numbers = [getattr(row, key) for key in COLUMNS]
+            ended = "completed" if row.completed else f"stopped at {row.stopped_at:.2f} s"
+            rows.append([name, *("-" if x is None else f"{x:.3g}" for x in numbers), ended])
+        return heads, rows
+
+
+def compare_scenario(
+    scenario: Scenario,
+    methods: Sequence[str] = (),
+    out: Path | None = None,
+    *,
+    progress: ProgressBar | None = None,
+) -> Comparison:
+    """Run a scenario under several methods and measure all of them alike.
+
+    Robot, plant, tasks, gains, references and events are those of the scenario; only the way in
+    which tasks, limits and singular directions come and go differs.
+
+    Args:
+        scenario: The scenario.
+        methods: Names of methods; none stands for all.
+        out: Directory for ``compare.json`` and ``compare.png``; None writes nothing.
+        progress: Bar that gets a line for each run.
+
+    Returns:
+        The measures.
+
+    Raises:
+        UnknownNameError: There is no such method.
+        ScenarioError: The scenario does not fit its robot.
+    """
+    for name in methods:
+        if name not in METHODS:
+            raise unknown_name("method", name, METHODS)
+    rows = {name: _run(scenario, name, progress) for name in methods or METHODS}
+    comparison = Comparison(scenario, rows)
+    if out is not None:
+        out.mkdir(parents=True, exist_ok=True)
+        write_json(out / "compare.json", comparison.to_json())
+        save(
+            comparison_figure({name: asdict(row) for name, row in rows.items()}),
+            out / "compare.png",
+        )
+    return comparison
+
+
+def _run(scenario: Scenario, name: str, progress: ProgressBar | None) -> Measures:
+    method = METHODS[name]
+    built = build(method.scenario(scenario), method.controller)
+    watch, timed = Watch(built.controller, scenario.events), Timed(built.controller)
+    line = progress.run(name, scenario.duration) if progress else None
+    observers = [watch, line] if line else [watch]
+    outcome = simulate(built.plant, timed, scenario.duration, observers, built.stop)
+    if line:
+        line.finish(outcome.t)
+    return measure(watch, timed, outcome)
