@@ -4,12 +4,13 @@ VENV := .venv
 BIN := $(VENV)/bin
 INSTALLED := $(VENV)/.installed
 
-.PHONY: help test lint test-slow reproduce constraints clean
+.PHONY: help test lint test-slow reproduce comparison constraints clean
 
 help:
 	@echo "make reproduce   the two experiments of the paper: tables and figures in results/"
 	@echo "make test        lint, types, import rules and the default test suite"
 	@echo "make test-slow   campaigns that take minutes"
+	@echo "make comparison  run other methods on the show-piece; rewrites the tables in the documents"
 	@echo "make constraints pin the versions that the tests cover"
 	@echo "make clean       remove the environment and everything that was made"
 
@@ -33,6 +34,9 @@ test-slow: $(INSTALLED)
 
 reproduce: $(INSTALLED)
 	$(BIN)/opspace reproduce all --out results
+
+comparison: $(INSTALLED)
+	$(BIN)/python docs/evidence/comparison.py
 
 constraints: $(INSTALLED)
 	$(BIN)/uv pip compile --quiet --universal --upgrade --python-version 3.10 --all-extras --no-header --no-annotate --no-emit-index-url --output-file constraints.txt pyproject.toml

@@ -52,16 +52,20 @@ class Comparison:
             "methods": {name: asdict(row) for name, row in self.rows.items()},
         }
 
-    def table(self) -> tuple[list[str], list[list[str]]]:
+    def table(self, keys: Sequence[str] | None = None) -> tuple[list[str], list[list[str]]]:
         """Write the measures, one row per method.
+
+        Args:
+            keys: Which measures, of `COLUMNS`; None for all.
 
         Returns:
             Heads with units, and rows.
         """
-        heads = ["method", *(f"{head} [{unit}]" for head, unit in COLUMNS.values()), "run"]
+        keys = tuple(COLUMNS) if keys is None else keys
+        heads = ["method", *(f"{COLUMNS[key][0]} [{COLUMNS[key][1]}]" for key in keys), "run"]
         rows = []
         for name, row in self.rows.items():
-            numbers = [getattr(row, key) for key in COLUMNS]
+            numbers = [getattr(row, key) for key in keys]
             ended = "completed" if row.completed else f"stopped at {row.stopped_at:.2f} s"
             rows.append([name, *("-" if x is None else f"{x:.3g}" for x in numbers), ended])
         return heads, rows
