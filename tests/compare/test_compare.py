@@ -78,7 +78,7 @@ def test_every_method_is_measured(compared):
 def test_a_switch_steps_and_a_transition_does_not(compared):
     rows = compared.rows
     assert rows["switch"].torque_step > 5.0 * rows["opspace"].torque_step
-    assert rows["gain-ramp"].torque_step > 2.0 * rows["opspace"].torque_step
+    assert rows["gain-ramp"].torque_step > 1.2 * rows["opspace"].torque_step
     assert rows["rate-clamp"].torque_step <= 1.0 + 1e-9
     assert rows["as-printed"].leak is not None
 
@@ -105,7 +105,7 @@ def test_the_continuous_inverse_is_the_blend_on_one_level():
     rng = np.random.default_rng(4)
     M = np.diag(rng.uniform(0.5, 2.0, 7))
     h = [0.3, 0.8]
-    tasks = [TaskSet(rng.normal(size=(2, 7)), rng.normal(size=2), 0, x) for x in h]
+    tasks = [TaskSet(3.0 * rng.normal(size=(2, 7)), rng.normal(size=2), 0, x) for x in h]
     tau = stack_of_tasks(np.linalg.cholesky(M), tasks, h, continuous_inverse)
     np.testing.assert_allclose(tau, task_torque(M, tasks), rtol=0, atol=1e-10)
 

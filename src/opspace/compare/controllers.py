@@ -11,6 +11,8 @@ from numpy.typing import ArrayLike
 
 from opspace.compare.blendings import CrossFade, Present
 from opspace.compare.laws import (
+    REGULARISATION,
+    SOFTNESS,
     continuous_inverse,
     damped_inverse,
     presences,
@@ -56,12 +58,36 @@ class GainRampController(Controller):
 
 
 class SoftWeightsController(Controller):
-    """Weights in one least-squares problem instead of priorities; weights fade."""
+    """Weights in one least-squares problem instead of priorities; weights fade.
+
+    A level weighs 100^(−number), so that one in between does not move the others.
+    """
+
+    _numbers: tuple[float, ...] = ()
+
+    def _task_sets(
+        self,
+        members: Sequence[Member],
+        activations: Sequence[float],
+        terms: Sequence[TaskTerms],
+        mixed: Mixture,
+    ) -> tuple[list[TaskSet], Sequence[Weighted]]:
+        self._numbers = mixed.levels
+        return super()._task_sets(members, activations, terms, mixed)
+
+    def _weight(self, rank: int) -> float:
+        """Weight of a level by its rank: joint limits have −1, the damping of the rest the last."""
+        if rank >= len(self._numbers):
+            return REGULARISATION
+        number = -2.0 if rank < 0 else self._numbers[rank]
+        return SOFTNESS**-number
 
     def _blend(
         self, L: np.ndarray, sets: Sequence[TaskSet], blend: Sequence[Weighted]
     ) -> tuple[np.ndarray, LawInfo]:
-        return weighted_least_squares(L, sets, presences(blend, len(sets))), LawInfo(1, 1, ())
+        presence = presences(blend, len(sets))
+        weights = [h * self._weight(t.priority) for h, t in zip(presence, sets, strict=True)]
+        return weighted_least_squares(L, sets, weights), LawInfo(1, 1, ())
 
 
 class ContinuousInverseController(Controller):

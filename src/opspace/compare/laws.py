@@ -8,19 +8,19 @@ from itertools import combinations
 import numpy as np
 
 from opspace.law import TaskSet, Weighted
-from opspace.law.hierarchy import WhitenedTask, levels_of, whiten
+from opspace.law.hierarchy import RANK_TOLERANCE, WhitenedTask, levels_of, whiten
 
 SOFTNESS = 100.0
 """Weight of a level relative to the one below it in the weighted least squares."""
 
-REGULARISATION = 1e-8
-"""Weight of ‖û‖² relative to the most important level."""
+REGULARISATION = 1e-10
+"""Weight of ‖û‖² relative to level 0."""
 
 EDGE, LARGEST_DAMPING = 0.6, 0.1
 """Below this σ a level is damped, at σ = 0 by this λ²; multiples of the usual σ."""
 
-Inverse = Callable[[np.ndarray, np.ndarray], np.ndarray]
-"""(JN (m, n), activation of each row (m,)) → generalised inverse (n, m)."""
+Inverse = Callable[[np.ndarray, np.ndarray, float], np.ndarray]
+"""(JN (m, n), activation of each row (m,), smallest singular value to count) → inverse (n, m)."""
 
 
 def presences(blend: Sequence[Weighted], count: int) -> list[float]:
@@ -30,27 +30,25 @@ def presences(blend: Sequence[Weighted], count: int) -> list[float]:
 
 
 def weighted_least_squares(
-    L: np.ndarray, tasks: Sequence[TaskSet], presence: Sequence[float]
+    L: np.ndarray, tasks: Sequence[TaskSet], weights: Sequence[float]
 ) -> np.ndarray:
     """Torque of a quadratic program without inequalities, in which a level is a weight.
 
-    min_û Σ_k h_k S^(−l_k) ‖Ĵ_k û − f_k‖² + ε ‖û‖², with S = 100 and l_k the rank of the level.
+    min_û Σ_k w_k ‖Ĵ_k û − f_k‖² + ε ‖û‖²
 
     Args:
         L: Cholesky factor of the inertia, (n, n).
         tasks: Task sets.
-        presence: h_k of each.
+        weights: w_k of each, presence times the weight of its level.
 
     Returns:
         (n,) N·m, bias not included.
     """
     n = len(L)
-    top = min((task.priority for task in tasks), default=0)
     rows, wanted = [np.sqrt(REGULARISATION) * np.eye(n)], [np.zeros(n)]
-    for task, white, h in zip(tasks, whiten(tasks, L), presence, strict=True):
-        weight = np.sqrt(h * SOFTNESS ** (top - task.priority))
-        rows.append(weight * white.J)
-        wanted.append(weight * white.f)
+    for white, weight in zip(whiten(tasks, L), weights, strict=True):
+        rows.append(np.sqrt(weight) * white.J)
+        wanted.append(np.sqrt(weight) * white.f)
     return L @ np.linalg.lstsq(np.concatenate(rows), np.concatenate(wanted), rcond=None)[0]
 
 
@@ -76,7 +74,7 @@ def stack_of_tasks(
             continue
         J, f, h = _stacked([whitened[k] for k in members], [presence[k] for k in members])
         JN = J @ N
-        X = inverse(JN, h)
+        X = inverse(JN, h, RANK_TOLERANCE * float(np.linalg.norm(J, 2)))
         u = u + X @ (f - J @ u)
         N = N - X @ JN
     return L @ u
@@ -93,8 +91,8 @@ def _stacked(
     )
 
 
-def continuous_inverse(JN: np.ndarray, h: np.ndarray) -> np.ndarray:
-    """Mansard's continuous inverse Σ_b Π_b h Π_{not b} (1 − h) (JN_b)⁺.
+def continuous_inverse(JN: np.ndarray, h: np.ndarray, least: float) -> np.ndarray:
+    """Mansard's continuous inverse Σ_b Π_b h Π_{not b} (1 − h) (JN_b)⁺, damped near singularities.
 
     Rows that share an activation come and go together, so b runs over groups of rows.
     """
@@ -108,19 +106,24 @@ def continuous_inverse(JN: np.ndarray, h: np.ndarray) -> np.ndarray:
             rows = [*always, *(moving[k] for k in chosen)]
             if rows:
                 rows = np.concatenate(rows)
-                X[:, rows] += np.prod(on) * np.linalg.pinv(JN[rows], rcond=1e-8)
+                X[:, rows] += np.prod(on) * _damped(JN[rows], least)
     return X
 
 
-def damped_inverse(JN: np.ndarray, h: np.ndarray) -> np.ndarray:
-    """Damped least squares Σ_i v_i √σ_i / (σ_i + λ²) u_iᵀ, with λ² rising as the smallest σ falls.
+def damped_inverse(JN: np.ndarray, h: np.ndarray, least: float) -> np.ndarray:
+    """Damped least squares, whatever the activations."""
+    del h
+    return _damped(JN, least)
+
+
+def _damped(JN: np.ndarray, least: float) -> np.ndarray:
+    """Return Σ_i v_i √σ_i / (σ_i + λ²) u_iᵀ, with λ² rising as the smallest σ falls.
 
     λ² = 0.1 (1 − σ_min / 0.6)² for σ_min below 0.6 (Nakamura), else 0.
     """
-    del h
     U, s, Vt = np.linalg.svd(JN, full_matrices=False)
     # Directions that the levels above have taken are not near a singularity, they are gone.
-    kept = s > 1e-8 * max(float(s[0]), 1e-300)
+    kept = s > least
     U, s, Vt = U[:, kept], s[kept], Vt[kept]
     smallest = float(s[-1] ** 2) if s.size else EDGE
     damping = LARGEST_DAMPING * max(1.0 - smallest / EDGE, 0.0) ** 2

@@ -65,7 +65,7 @@ METHODS: Mapping[str, Method] = MappingProxyType(
         ),
         "continuous-inverse": Method(
             "Mansard's continuous inverse at every level",
-            _NO_BUFFER,
+            "joint limits fade; damping near singularities",
             others.ContinuousInverseController,
         ),
         "damped": Method(

@@ -17,7 +17,10 @@ from opspace.scenario import Scenario
 from opspace.scenario.build import build
 from opspace.scenario.load import to_dict
 from opspace.scenario.progress import ProgressBar
-from opspace.sim import simulate
+from opspace.sim import StopRule, simulate
+
+GIVE_UP_SPEED = 50.0
+"""Joint speed at which a run is given up where the scenario names none, rad/s or m/s."""
 
 COLUMNS: Mapping[str, tuple[str, str]] = {
     "torque_step": ("torque step", "N·m"),
@@ -117,7 +120,8 @@ def _run(scenario: Scenario, name: str, progress: ProgressBar | None) -> Measure
     watch, timed = Watch(built.controller, scenario.events), Timed(built.controller)
     line = progress.run(name, scenario.duration) if progress else None
     observers = [watch, line] if line else [watch]
-    outcome = simulate(built.plant, timed, scenario.duration, observers, built.stop)
+    stop = StopRule(built.stop.max_joint_speed or GIVE_UP_SPEED, built.stop.max_torque)
+    outcome = simulate(built.plant, timed, scenario.duration, observers, stop)
     if line:
         line.finish(outcome.t)
     return measure(watch, timed, outcome)
