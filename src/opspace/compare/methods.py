@@ -44,7 +44,11 @@ _NO_BUFFER = "joint limits fade; no sigma buffer"
 
 METHODS: Mapping[str, Method] = MappingProxyType(
     {
-        "opspace": Method("intermediate desired values, the library's default", _FADE),
+        "opspace": Method(
+            "the library's default: intermediate desired values while few tasks move",
+            _FADE,
+            changes={"blending": "auto"},
+        ),
         "chain": Method("chain blending, k + 1 hard torques", _FADE, changes={"blending": "chain"}),
         "switch": Method("hard switch", _SWITCH, changes={"method": "switch"}),
         "cross-fade": Method(

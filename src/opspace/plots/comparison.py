@@ -8,6 +8,7 @@ from typing import Any
 from matplotlib.figure import Figure
 
 from opspace.plots import style
+from opspace.plots.labels import number
 
 _PANELS = {
     "torque_step": "largest torque step\nper tick [N·m]",
@@ -41,8 +42,8 @@ def comparison_figure(rows: Mapping[str, Mapping[str, Any]]) -> Figure:
         panel.set_xlim(left, right * (right / left) ** 0.45)
         panel.barh(names, values, left=0.0, color=colors, height=0.62)
         for place, name in enumerate(names):
-            number = rows[name][key]
-            text = "-" if number is None else f"{number:.2g}"
+            value = rows[name][key]
+            text = "-" if value is None else number(value)
             if not rows[name]["completed"]:
                 text += f" (to {rows[name]['stopped_at']:.1f} s)"
             panel.text(
