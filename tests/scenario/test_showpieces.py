@@ -7,20 +7,25 @@ import pytest
 
 from opspace.robots import load_robot
 from opspace.scenario import load_scenario
-from opspace.scenario.run import run_scenario
+from tests.scenario.command import run_by_command
 
 SMOOTH = 1.0
 """Largest step of any joint's torque from one tick of 1 ms to the next, N·m."""
 
-NAMES = ("showpiece-panda", "showpiece")
 FENCE = {"showpiece-panda": "panda_joint1", "showpiece": "joint1"}
+
+
+NAMES = ("showpiece-panda", pytest.param("showpiece", marks=pytest.mark.slow))
+
+# One worker runs them, once.
+pytestmark = pytest.mark.xdist_group("showpieces")
 
 
 @pytest.fixture(scope="module", params=NAMES)
 def shown(request, tmp_path_factory):
     scenario = load_scenario(request.param)
     out = tmp_path_factory.mktemp("run") / request.param
-    return request.param, scenario, run_scenario(scenario, out).recording
+    return request.param, scenario, run_by_command(request.param, out)
 
 
 def torque_step(recording):
@@ -125,5 +130,5 @@ def test_everything_returns_to_where_it_began(shown):
 @pytest.mark.parametrize("name", NAMES)
 def test_hard_switches_of_the_same_story_are_far_from_smooth(name, tmp_path):
     # The first third, with two pairs of events and the singularity, is enough.
-    scenario = load_scenario(name, ["method=switch", "duration=7.0"])
-    assert torque_step(run_scenario(scenario, tmp_path / "run").recording) > 20.0 * SMOOTH
+    found = run_by_command(name, tmp_path / "run", "method=switch", "duration=7.0")
+    assert torque_step(found) > 20.0 * SMOOTH

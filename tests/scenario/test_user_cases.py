@@ -5,8 +5,9 @@ from functools import cache
 import numpy as np
 import pytest
 
-from opspace.scenario import load_scenario
-from opspace.scenario.run import run_scenario
+from tests.scenario.command import run_by_command
+
+pytestmark = pytest.mark.xdist_group("user-cases")
 
 
 @pytest.fixture(scope="module")
@@ -14,7 +15,7 @@ def recording(tmp_path_factory):
     @cache
     def run(name, *overrides):
         out = tmp_path_factory.mktemp("run") / name
-        return run_scenario(load_scenario(name, list(overrides)), out).recording
+        return run_by_command(name, out, *overrides)
 
     return run
 
