@@ -13,6 +13,7 @@ from opspace.compare.blendings import CrossFade, Present
 from opspace.compare.laws import (
     REGULARISATION,
     SOFTNESS,
+    Inverse,
     continuous_inverse,
     damped_inverse,
     presences,
@@ -90,26 +91,28 @@ class SoftWeightsController(Controller):
         return weighted_least_squares(L, sets, weights), LawInfo(1, 1, ())
 
 
-class ContinuousInverseController(Controller):
+class _StackOfTasksController(Controller):
+    """Levels one after the other, each with a generalised inverse of its own."""
+
+    _inverse: Inverse
+
+    def _blend(
+        self, L: np.ndarray, sets: Sequence[TaskSet], blend: Sequence[Weighted]
+    ) -> tuple[np.ndarray, LawInfo]:
+        tau = stack_of_tasks(L, sets, presences(blend, len(sets)), self._inverse)
+        return tau, LawInfo(1, len({task.priority for task in sets}), ())
+
+
+class ContinuousInverseController(_StackOfTasksController):
     """Mansard's continuous inverse at every level."""
 
-    def _blend(
-        self, L: np.ndarray, sets: Sequence[TaskSet], blend: Sequence[Weighted]
-    ) -> tuple[np.ndarray, LawInfo]:
-        presence = presences(blend, len(sets))
-        tau = stack_of_tasks(L, sets, presence, continuous_inverse)
-        return tau, LawInfo(1, len({task.priority for task in sets}), ())
+    _inverse = staticmethod(continuous_inverse)
 
 
-class DampedController(Controller):
+class DampedController(_StackOfTasksController):
     """Damped least squares at every level, for tasks that switch."""
 
-    def _blend(
-        self, L: np.ndarray, sets: Sequence[TaskSet], blend: Sequence[Weighted]
-    ) -> tuple[np.ndarray, LawInfo]:
-        presence = presences(blend, len(sets))
-        tau = stack_of_tasks(L, sets, presence, damped_inverse)
-        return tau, LawInfo(1, len({task.priority for task in sets}), ())
+    _inverse = staticmethod(damped_inverse)
 
 
 class AsPrintedController(Controller):
