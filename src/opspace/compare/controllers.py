@@ -20,7 +20,7 @@ from opspace.compare.laws import (
     stack_of_tasks,
     weighted_least_squares,
 )
-from opspace.controller import Command, Controller
+from opspace.controller import Command, ReferenceController
 from opspace.law import LawInfo, TaskSet, Weighted, task_torque
 from opspace.stack import Member, Mixture
 from opspace.tasks import TaskTerms
@@ -29,7 +29,7 @@ MAX_RATE = 1000.0
 """Torque rate that the clamp lets through, N·m/s: 1 N·m per millisecond."""
 
 
-class CrossFadeController(Controller):
+class CrossFadeController(ReferenceController):
     """Linear cross-fade between the hard torques before and after each change."""
 
     def __init__(self, *args: Any, **options: Any) -> None:
@@ -37,7 +37,7 @@ class CrossFadeController(Controller):
         self._blending = CrossFade()
 
 
-class GainRampController(Controller):
+class GainRampController(ReferenceController):
     """A task takes its directions at once; only the acceleration that it asks for fades."""
 
     def __init__(self, *args: Any, **options: Any) -> None:
@@ -58,7 +58,7 @@ class GainRampController(Controller):
         return super()._task_sets(members, activations, faded, mixed)
 
 
-class SoftWeightsController(Controller):
+class SoftWeightsController(ReferenceController):
     """Weights in one least-squares problem instead of priorities; weights fade.
 
     A level weighs 100^(−number), so that one in between does not move the others.
@@ -91,7 +91,7 @@ class SoftWeightsController(Controller):
         return weighted_least_squares(L, sets, weights), LawInfo(1, 1, ())
 
 
-class _StackOfTasksController(Controller):
+class _StackOfTasksController(ReferenceController):
     """Levels one after the other, each with a generalised inverse of its own."""
 
     _inverse: Inverse
@@ -115,7 +115,7 @@ class DampedController(_StackOfTasksController):
     _inverse = staticmethod(damped_inverse)
 
 
-class AsPrintedController(Controller):
+class AsPrintedController(ReferenceController):
     """Eq. 15-23 to the letter, without the term that subtracts what higher levels do."""
 
     def _blend(
@@ -126,7 +126,7 @@ class AsPrintedController(Controller):
         return task_torque(L @ L.T, active, coupling="as-printed", info=True)
 
 
-class RateClampController(Controller):
+class RateClampController(ReferenceController):
     """Whatever the controller commands, the torque changes by at most 1 N·m per millisecond."""
 
     def __init__(self, *args: Any, **options: Any) -> None:
@@ -142,4 +142,4 @@ class RateClampController(Controller):
             most = MAX_RATE * (command.t - before)
             tau = sent + np.clip(tau - sent, -most, most)
         self._sent = command.t, tau
-        return replace(command, tau=tau)
+        return command._replace(tau=tau)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from opspace.controller import Command, Controller, Status
+from opspace.controller import Command, ReferenceController, Status
 from opspace.robots import Robot
 from opspace.scenario.events import Event
 from opspace.sim import Outcome
@@ -49,7 +49,7 @@ class Measures:
 class Timed:
     """A controller whose ticks are timed."""
 
-    def __init__(self, controller: Controller) -> None:
+    def __init__(self, controller: ReferenceController) -> None:
         self._controller = controller
         self.seconds: list[float] = []
 
@@ -69,7 +69,7 @@ class Timed:
 class Watch:
     """The observer that collects what is measured."""
 
-    def __init__(self, controller: Controller, events: Sequence[Event]) -> None:
+    def __init__(self, controller: ReferenceController, events: Sequence[Event]) -> None:
         self._controller = controller
         self._tasks = {task.name: task for task in controller.stack}
         self._events = events

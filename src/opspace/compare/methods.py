@@ -8,7 +8,7 @@ from types import MappingProxyType
 from typing import Any
 
 from opspace.compare import controllers as others
-from opspace.controller import Controller
+from opspace.controller import Controller, ReferenceController
 from opspace.scenario import Scenario
 
 
@@ -26,7 +26,7 @@ class Method:
 
     title: str
     limits: str
-    controller: type[Controller] = Controller
+    controller: type[ReferenceController] = Controller
     changes: Mapping[str, Any] = field(default_factory=dict[str, Any])
     profile: str | None = None
 

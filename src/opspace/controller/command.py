@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Flag, IntFlag
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
@@ -64,24 +65,62 @@ class LevelStatus:
     directions: np.ndarray
 
 
+class Report(Protocol):
+    """What a tick tells about tasks, levels and limits, perhaps worked out only when asked."""
+
+    @property
+    def tasks(self) -> Mapping[str, TaskStatus]:
+        """Status of each task in the stack by name."""
+        ...
+
+    @property
+    def levels(self) -> tuple[LevelStatus, ...]:
+        """Status of each level, most important first; joint limits are not among them."""
+        ...
+
+    @property
+    def limits(self) -> Mapping[str, float]:
+        """Activation of the joint-limit tasks that are not at 0, by "joint/side"."""
+        ...
+
+
 @dataclass(frozen=True, slots=True)
-class Command:
+class Found:
+    """A report that is complete from the start; the attributes are those of `Report`."""
+
+    tasks: Mapping[str, TaskStatus]
+    levels: tuple[LevelStatus, ...]
+    limits: Mapping[str, float]
+
+
+class Command(NamedTuple):
     """The answer of one tick.
 
     Attributes:
         t: Time of the tick, s.
         tau: (n,) joint torque, N·m, bias included; always finite.
         status: What happened.
-        tasks: Status of each task in the stack by name.
-        levels: Status of each level, most important first; joint limits are not among them.
-        limits: Activation of the joint-limit tasks that are not at 0, by "joint/side".
         hard_solves: Hard torques that entered the blend.
+        report: Tasks, levels and limits; read them as attributes of the command.
     """
 
     t: float
     tau: np.ndarray
     status: Status
-    tasks: Mapping[str, TaskStatus]
-    levels: tuple[LevelStatus, ...]
-    limits: Mapping[str, float]
     hard_solves: int
+    report: Report
+
+    @property
+    def tasks(self) -> Mapping[str, TaskStatus]:
+        """Status of each task in the stack by name."""
+        return self.report.tasks
+
+    @property
+    def levels(self) -> tuple[LevelStatus, ...]:
+        """Status of each level, most important first; joint limits are not among them."""
+        return self.report.levels
+
+    @property
+    def limits(self) -> Mapping[str, float]:
+        """Activation of the joint-limit tasks that are not at 0, by "joint/side"."""
+        return self.report.limits

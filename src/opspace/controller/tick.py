@@ -1,4 +1,4 @@
-"""One tick of operational space control: state in, torque and diagnostics out."""
+"""One tick of operational space control in readable form: state in, torque and diagnostics out."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from opspace.controller.command import Command, Status
+from opspace.controller.command import Command, Found, Status
 from opspace.controller.joint_limits import (
     Insertion,
     insertions,
@@ -40,8 +40,11 @@ LIMIT_PASSES = 4
 joints that the ones before pushed against their own limits."""
 
 
-class Controller:
-    """Operational space control of a stack of tasks on a robot.
+class ReferenceController:
+    """Operational space control of a stack of tasks on a robot, written to be read.
+
+    `opspace.Controller` computes the same in compiled form; this is what it is tested against, and
+    what other control laws are derived from.
 
     Args:
         robot: The robot; the controller updates it at every tick.
@@ -134,7 +137,7 @@ class Controller:
         if any(np.any(level.activation < 1.0) for level in levels):
             status |= Status.DIRECTION_OFF
         tasks = task_status(members, activations, terms, mixed)
-        return Command(t, tau, status, tasks, levels, limits, info.hard_solves)
+        return Command(t, tau, status, info.hard_solves, Found(tasks, levels, limits))
 
     def _activation(self, member: Member, t: float) -> float:
         """Presence in the stack times the task's own activation."""

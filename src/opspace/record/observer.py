@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from opspace.controller import Command, Controller
+from opspace.controller import Command, ReferenceController
 from opspace.errors import InputError
 from opspace.record.format import Column, Ended
 from opspace.record.writer import Recorder
@@ -17,7 +17,7 @@ _NOTHING = np.zeros(0)
 
 
 def columns_of(
-    controller: Controller,
+    controller: ReferenceController,
     tasks: Sequence[Task] = (),
     levels: Mapping[float, Sequence[Task]] | None = None,
 ) -> list[Column]:
@@ -95,7 +95,7 @@ class TickRecorder:
     def __init__(
         self,
         directory: Path,
-        controller: Controller,
+        controller: ReferenceController,
         header: Mapping[str, object],
         *,
         tasks: Sequence[Task] = (),
@@ -140,7 +140,7 @@ class TickRecorder:
         self._recorder.close(how, reason)
 
 
-def _directions(controller: Controller, level: Sequence[Task]) -> int:
+def _directions(controller: ReferenceController, level: Sequence[Task]) -> int:
     return min(sum(task.rows for task in level), controller.robot.nv)
 
 

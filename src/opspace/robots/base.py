@@ -10,6 +10,7 @@ import numpy as np
 
 from opspace.errors import InputError, unknown_name
 from opspace.robots.description import Description
+from opspace.robots.motion_axes import MotionAxes
 
 
 class AdapterBase(ABC):
@@ -87,11 +88,23 @@ class AdapterBase(ABC):
             InputError: A wrong shape, a number that is not finite, or a zero quaternion.
         """
         q, v = np.asarray(q, dtype=float), np.asarray(v, dtype=float)
-        self._check(q, v)
+        self.check_state(q, v)
         self._q[:] = q
         self._v[:] = v
         for i in self.description.quaternions:
             self._q[i : i + 4] /= math.sqrt(q[i : i + 4] @ q[i : i + 4])
+        self._cache.clear()
+        self._compute()
+
+    def place(self, q: np.ndarray, v: np.ndarray) -> None:
+        """Set a state that is checked elsewhere: `update` without its checks.
+
+        Args:
+            q: (nq,) configuration of a robot without quaternions.
+            v: (nv,) velocity in rad/s (m/s).
+        """
+        self._q[:] = q
+        self._v[:] = v
         self._cache.clear()
         self._compute()
 
@@ -149,6 +162,10 @@ class AdapterBase(ABC):
         """Return the same robot with a state of its own; the model is shared."""
 
     @abstractmethod
+    def motion_axes(self) -> MotionAxes | None:
+        """Return the arrays that compiled code reads, or None if a joint has several coordinates."""
+
+    @abstractmethod
     def integrate(self, q: np.ndarray, v: np.ndarray, dt: float) -> np.ndarray:
         """Return q ⊕ v dt on the configuration manifold, (nq,)."""
 
@@ -193,7 +210,16 @@ class AdapterBase(ABC):
             self._cache[key] = value
         return value
 
-    def _check(self, q: np.ndarray, v: np.ndarray) -> None:
+    def check_state(self, q: np.ndarray, v: np.ndarray) -> None:
+        """Check a state.
+
+        Args:
+            q: Configuration.
+            v: Velocity.
+
+        Raises:
+            InputError: A wrong shape, a number that is not finite, or a zero quaternion.
+        """
         for name, value, size in (("q", q, self.nq), ("v", v, self.nv)):
             if value.shape != (size,):
                 raise InputError(f"{name} of {self.name} has shape {value.shape}, not ({size},)")

@@ -10,6 +10,7 @@ import numpy as np
 
 from opspace.robots.base import AdapterBase
 from opspace.robots.description import Description
+from opspace.robots.motion_axes import FramePlace, MassPoint, MotionAxes
 
 
 class MujocoRobot(AdapterBase):
@@ -39,6 +40,9 @@ class MujocoRobot(AdapterBase):
         self._M_view, self._bias_view = self._M.view(), self._bias.view()
         self._M_view.setflags(write=False)
         self._bias_view.setflags(write=False)
+        self._axes = np.zeros((self.nv, 6))
+        self._placement = np.zeros((model.nbody + model.nsite, 12))
+        self._origins = _dof_origins(model)
         self.update(self.q_reference, np.zeros(self.nv))
 
     @property
@@ -54,6 +58,41 @@ class MujocoRobot(AdapterBase):
     def fresh(self) -> MujocoRobot:
         """Return the same robot with a state of its own; the model is shared."""
         return MujocoRobot(self.description, self._model)
+
+    def motion_axes(self) -> MotionAxes | None:
+        """Return the arrays that compiled code reads, or None if a joint has several coordinates."""
+        model = self._model
+        if self.nq != self.nv or model.njnt != self.nv:
+            return None
+        identity = np.concatenate((np.eye(3).reshape(9), np.zeros(3)))
+        frames = {
+            id_: FramePlace(
+                body if site < 0 else model.nbody + site, self._last_dof(body), identity
+            )
+            for id_, (body, site) in enumerate(zip(self._bodies, self._sites, strict=True))
+        }
+        return MotionAxes(
+            q=self._q,
+            v=self._v,
+            M=self._M,
+            bias=self._bias,
+            axes=self._axes,
+            placement=self._placement,
+            parent=np.array(model.dof_parentid, dtype=np.int64),
+            frames=frames,
+            masses=tuple(
+                MassPoint(
+                    b, self._last_dof(b), float(model.body_mass[b]), model.body_ipos[b].copy()
+                )
+                for b in self._massive
+            ),
+        )
+
+    def _last_dof(self, body: int) -> int:
+        """Return the last joint coordinate that moves a body, −1 for none."""
+        carrier = self._model.body_weldid[body]
+        count = int(self._model.body_dofnum[carrier])
+        return int(self._model.body_dofadr[carrier]) + count - 1 if count else -1
 
     def integrate(self, q: np.ndarray, v: np.ndarray, dt: float) -> np.ndarray:
         """Return q ⊕ v dt on the configuration manifold, (nq,)."""
@@ -79,6 +118,22 @@ class MujocoRobot(AdapterBase):
         mujoco.mj_fullM(model, data, self._M)
         mujoco.mj_comVel(model, data)
         mujoco.mj_rne(model, data, 0, self._bias)
+        self._fill_axes()
+
+    def _fill_axes(self) -> None:
+        """Bring MuJoCo's motion axes, about the centre of mass of each tree, to the world's origin."""
+        data, axes = self._data, self._axes
+        turn = data.cdof[:, :3]
+        axes[:, 3:] = turn
+        axes[:, :3] = data.cdof[:, 3:] + np.cross(data.subtree_com[self._origins], turn)
+        bodies = self._model.nbody
+        placement = self._placement
+        for rows, R, p in (
+            (slice(0, bodies), data.xmat, data.xpos),
+            (slice(bodies, None), data.site_xmat, data.site_xpos),
+        ):
+            placement[rows, :9] = R.reshape(-1, 3, 3).transpose(0, 2, 1).reshape(-1, 9)
+            placement[rows, 9:] = p
 
     def _gravity(self, _: int) -> np.ndarray:
         # g(q) = -sum_i m_i J_i^T g, which is the whole mass at the centre of mass.
@@ -129,3 +184,8 @@ def _site(model: mujoco.MjModel, name: str) -> int:
     """Return the id of the site of this name, or -1 where a body has it."""
     is_body = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, name) >= 0
     return -1 if is_body else mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SITE, name)
+
+
+def _dof_origins(model: mujoco.MjModel) -> np.ndarray:
+    """Return the body whose subtree's centre of mass each motion axis refers to."""
+    return np.array(model.body_rootid[model.dof_bodyid], dtype=np.intp)

@@ -12,9 +12,14 @@ import pinocchio as pin
 
 from opspace.robots.base import AdapterBase
 from opspace.robots.description import Description
+from opspace.robots.motion_axes import FramePlace, MassPoint, MotionAxes
 from opspace.robots.pinocchio_model import frame_ids
 
 ALIGNED = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+# Looked up once: an attribute of the module costs as much as some of the mathematics.
+WORLD_CONVENTION = pin.Convention.WORLD
+nonlinear_effects = pin.nonLinearEffects
+composite_inertia = pin.crba
 
 
 class PinocchioRobot(AdapterBase):
@@ -41,6 +46,8 @@ class PinocchioRobot(AdapterBase):
         self._M.setflags(write=False)
         self._bias = self._data.nle
         self._bias.setflags(write=False)
+        self._accelerations_known = False
+        self._placement = _contiguous_placements(self._data)
         self.update(self.q_reference, self._zero)
 
     @property
@@ -56,6 +63,28 @@ class PinocchioRobot(AdapterBase):
     def fresh(self) -> PinocchioRobot:
         """Return the same robot with a state of its own; the model is shared."""
         return PinocchioRobot(self.description, self._model)
+
+    def motion_axes(self) -> MotionAxes | None:
+        """Return the arrays that compiled code reads, or None if a joint has several coordinates."""
+        model = self._model
+        if self.nq != self.nv or model.njoints != self.nv + 1 or self._placement is None:
+            return None
+        frames = {id_: _frame_place(model.frames[f]) for id_, f in enumerate(self._frames)}
+        return MotionAxes(
+            q=self._q,
+            v=self._v,
+            M=self._data.M.T,
+            bias=self._data.nle,
+            axes=self._data.J.T,
+            placement=self._placement,
+            parent=np.array([model.parents[j] - 1 for j in range(1, model.njoints)]),
+            frames=frames,
+            masses=tuple(
+                MassPoint(j, j - 1, inertia.mass, np.array(inertia.lever))
+                for j, inertia in enumerate(model.inertias)
+                if j > 0 and inertia.mass > 0.0
+            ),
+        )
 
     def integrate(self, q: np.ndarray, v: np.ndarray, dt: float) -> np.ndarray:
         """Return q ⊕ v dt on the configuration manifold, (nq,)."""
@@ -73,11 +102,10 @@ class PinocchioRobot(AdapterBase):
     def _compute(self) -> None:
         model, data, q = self._model, self._data, self._order(self._q)
         self._q_pin = q
-        # At zero acceleration a frame's acceleration is its drift Jdot v.
-        pin.forwardKinematics(model, data, q, self._v, self._zero)
+        self._accelerations_known = False
+        nonlinear_effects(model, data, q, self._v)
         # The world convention leaves the joint Jacobians in the data, which the frames read.
-        pin.crba(model, data, q, pin.Convention.WORLD)
-        pin.nonLinearEffects(model, data, q, self._v)
+        composite_inertia(model, data, q, WORLD_CONVENTION)
 
     def _gravity(self, _: int) -> np.ndarray:
         return np.array(pin.computeGeneralizedGravity(self._model, self._scratch, self._q_pin))
@@ -95,6 +123,10 @@ class PinocchioRobot(AdapterBase):
         return np.ascontiguousarray(J)
 
     def _drift(self, frame: int) -> np.ndarray:
+        if not self._accelerations_known:
+            # At zero acceleration a frame's acceleration is its drift Jdot v.
+            pin.forwardKinematics(self._model, self._data, self._q_pin, self._v, self._zero)
+            self._accelerations_known = True
         motion = pin.getFrameClassicalAcceleration(
             self._model, self._data, self._frames[frame], ALIGNED
         )
@@ -122,3 +154,30 @@ def _quaternion_order(
     for start in quaternions:
         index[start : start + 4] = start + np.array(order)
     return index
+
+
+def _frame_place(frame: Any) -> FramePlace:
+    """Return where a frame is: joint j moves coordinate j − 1, joint 0 is the world."""
+    placement = frame.placement
+    local = np.concatenate((placement.rotation.T.reshape(9), placement.translation))
+    return FramePlace(int(frame.parentJoint), int(frame.parentJoint) - 1, local)
+
+
+def _contiguous_placements(data: Any) -> np.ndarray | None:
+    """Return a view (joints, 12) on the joint placements, or None where they lie otherwise.
+
+    They are one vector of nine numbers of rotation and three of position each, which is checked.
+    """
+    first = data.oMi[0].rotation
+    start, size = first.ctypes.data, 12 * first.itemsize
+    for j in range(len(data.oMi)):
+        rotation, translation = data.oMi[j].rotation, data.oMi[j].translation
+        if (
+            rotation.ctypes.data != start + j * size
+            or translation.ctypes.data != start + j * size + 9 * first.itemsize
+            or not rotation.flags.f_contiguous
+        ):
+            return None
+    return np.lib.stride_tricks.as_strided(
+        first.T, shape=(len(data.oMi), 12), strides=(size, first.itemsize)
+    )

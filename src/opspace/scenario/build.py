@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from opspace.controller import Controller, Singularity
+from opspace.controller import Controller, ReferenceController, Singularity
 from opspace.errors import OpspaceError, UnknownNameError
 from opspace.robots import Robot, load_robot
 from opspace.scenario.build_tasks import build_tasks, check_configuration, configuration
@@ -39,12 +39,12 @@ class Built:
     robot: Robot
     stack: Stack
     tasks: Mapping[str, Task]
-    controller: Controller
+    controller: ReferenceController
     plant: Plant
     stop: StopRule
 
 
-def build(scenario: Scenario, controller: type[Controller] = Controller) -> Built:
+def build(scenario: Scenario, controller: type[ReferenceController] = Controller) -> Built:
     """Build what a scenario describes.
 
     Args:

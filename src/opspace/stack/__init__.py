@@ -2,6 +2,7 @@
 
 from opspace.stack.blending import Blending as Blending
 from opspace.stack.members import Member as Member
+from opspace.stack.members import Variable as Variable
 from opspace.stack.mixture import Mixture as Mixture
 from opspace.stack.mixture import Slot as Slot
 from opspace.stack.mixture import mixture as mixture

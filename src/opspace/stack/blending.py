@@ -26,6 +26,9 @@ class Blending:
     Args:
         name: ``"auto"`` for at most 3 exact ones, ``"idv"`` for 16, ``"chain"`` for none.
 
+    Attributes:
+        room: How many activations may be in the exact group.
+
     Raises:
         UnknownNameError: There is no such blending.
     """
@@ -34,7 +37,7 @@ class Blending:
         if name not in EXACT:
             raise unknown_name("blending", name, EXACT)
         self.name = name
-        self._room = EXACT[name]
+        self.room = EXACT[name]
         self._exact: set[object] = set()
         self._chained: set[object] = set()
 
@@ -54,7 +57,7 @@ class Blending:
         for who in moving:
             if who in self._exact or who in self._chained:
                 continue
-            joined = self._exact if len(self._exact) < self._room else self._chained
+            joined = self._exact if len(self._exact) < self.room else self._chained
             joined.add(who)
         if not self._chained:
             return corners(values, "idv")

@@ -31,6 +31,9 @@ class Transitions:
         self._now: float | None = None
         self._ticked: tuple[Member, ...] = ()
         self._prepare: Callable[[Task], None] | None = None
+        # Nothing happens to the stack before this time, unless something new is asked.
+        self._next = -math.inf
+        self._asked = False
         # One request at a time is prepared, which takes long; the other lock is held briefly.
         self._requesting = RLock()
         self._lock = Lock()
@@ -74,11 +77,13 @@ class Transitions:
                 self.prepare(request.task)
             with self._lock:
                 insort(self._queue, self._checked(request), key=lambda queued: queued.order)
+                self._asked = True
 
     def cancel(self) -> None:
         """Empty the queue."""
         with self._requesting, self._lock:
             self._queue.clear()
+            self._asked = True
 
     def prepare(self, task: Task) -> None:
         """Get a task ready that no tick is using."""
@@ -107,12 +112,18 @@ class Transitions:
             t: Time of the tick, s.
 
         Returns:
-            The tasks of this tick, which only the thread of the controller changes.
+            The tasks of this tick, which only the thread of the controller changes: the same
+            object as at the tick before if nothing has begun or ended since.
         """
+        if t < self._next and not self._asked:
+            self._now = t
+            return self._ticked
         if self._lock.acquire(blocking=False):
             try:
+                self._asked = False
                 self._start_due(t)
                 self._tidy(t)
+                self._next = self._next_event(t)
                 self._ticked = tuple(self._members.values())
             finally:
                 self._lock.release()
@@ -141,6 +152,17 @@ class Transitions:
                 del self._members[name]
             elif len(member.places) > 1:
                 member.tidy(t)
+
+    def _next_event(self, t: float) -> float:
+        """Return the time at which the next request is due or the next ramp arrives, s."""
+        due = [q.request.timing.start_time or -math.inf for q in self._queue]
+        ramps = [
+            variable.ramp.start_time + variable.ramp.duration
+            for member in self._members.values()
+            for variable in (member.presence, *(place.arrival for place in member.places))
+            if variable is not None and not variable.arrived(t)
+        ]
+        return min([*due, *ramps], default=math.inf)
 
     def _waiting(self) -> list[Task]:
         return [q.request.task for q in self._queue if isinstance(q.request, Insert)]

@@ -53,7 +53,7 @@ class JointTask(PostureTask):
 
     def _resolve(self, robot: Robot) -> None:
         super()._resolve(robot)
-        layout = self._layout
+        layout = self.layout
         if layout is not None and len(layout.entries) * self.rows != 1:
             raise InputError(
                 f"task {self.name!r}: a joint task needs a joint of one degree of freedom, but "

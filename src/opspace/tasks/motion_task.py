@@ -34,6 +34,12 @@ class MotionTask(TrackingTask):
 
     The term ω × ẋ is in both and cancels in f* − J̇_t v: tool axes choose rows and gains, not
     another motion. Of the angular rows it is zero.
+
+    Attributes:
+        source: Where the motion is measured.
+        quantity: What of it is controlled.
+        selection: (m, k) the selected rows S.
+        in_tool_axes: Whether they are rows of the frame's axes.
     """
 
     def __init__(
@@ -63,21 +69,21 @@ class MotionTask(TrackingTask):
             kv=kv,
             max_speed=max_speed,
         )
-        self._source = source
-        self._quantity = quantity
-        self._selection = selection
-        self._in_tool_axes = axes_frame == "tool"
+        self.source = source
+        self.quantity = quantity
+        self.selection = selection
+        self.in_tool_axes = axes_frame == "tool"
         self.target = target
 
     def evaluate(self, robot: Robot, t: float) -> TaskTerms:
         """Return the terms of the task at the robot's present state."""
         self._require_bound(robot)
-        quantity, block = self._quantity, self._quantity.block
-        motion = self._source.measure(robot)
+        quantity, block = self.quantity, self.quantity.block
+        motion = self.source.measure(robot)
         desired = self._desired(t, lambda: quantity.value(motion))
         error = quantity.error(motion, desired.x)
-        basis, drift = self._selection, motion.drift[block]
-        if self._in_tool_axes:
+        basis, drift = self.selection, motion.drift[block]
+        if self.in_tool_axes:
             transport = _transport(motion)[block]
             basis = basis @ _tool_axes(motion.rotation)[: len(error), : len(error)]
             drift = drift - transport
@@ -91,16 +97,20 @@ class MotionTask(TrackingTask):
             desired=desired,
         )
 
+    def desired(self, robot: Robot, t: float) -> Sample:
+        """See `TrackingTask.desired`."""
+        return self._desired(t, lambda: self.quantity.value(self.source.measure(robot)))
+
     def reset(self) -> None:
         """Forget the held start value and which way round a rotation error went."""
         super().reset()
-        self._quantity.reset()
+        self.quantity.reset()
 
     def _resolve(self, robot: Robot) -> None:
-        self._source.bind(robot)
+        self.source.bind(robot)
 
     def _check_value(self, value: ArrayLike, what: str) -> Array:
-        return self._quantity.check(value, what)
+        return self.quantity.check(value, what)
 
 
 def axes_selection(axes: str, name: str) -> Array:

@@ -56,19 +56,20 @@ class WorldFrame:
     Attributes:
         frame: Name of the frame; None is the robot's tool.
         offset: (3,) point in the frame's axes, m; None is the origin.
+        id: Id of the frame once it is bound.
     """
 
     frame: str | None
     offset: Array | None = None
-    _id: int = field(default=-1, repr=False)
+    id: int = field(default=-1, repr=False)
 
     def bind(self, robot: Robot) -> None:
         """Look up the frame."""
-        self._id = robot.frame_id(robot.tool if self.frame is None else self.frame)
+        self.id = robot.frame_id(robot.tool if self.frame is None else self.frame)
 
     def measure(self, robot: Robot) -> Motion:
         """Return the motion of the point."""
-        id_ = self._id
+        id_ = self.id
         position, rotation = robot.position(id_), robot.rotation(id_)
         velocity, J, drift = robot.velocity(id_), robot.jacobian(id_), robot.drift(id_)
         if self.offset is None:
@@ -94,20 +95,21 @@ class RelativeFrame:
     Attributes:
         frame: Name of the frame; None is the robot's tool.
         reference_frame: Name of the frame it is seen from.
+        ids: Ids of both frames once they are bound.
     """
 
     frame: str | None
     reference_frame: str
-    _ids: tuple[int, int] = field(default=(-1, -1), repr=False)
+    ids: tuple[int, int] = field(default=(-1, -1), repr=False)
 
     def bind(self, robot: Robot) -> None:
         """Look up both frames."""
         frame = robot.tool if self.frame is None else self.frame
-        self._ids = (robot.frame_id(frame), robot.frame_id(self.reference_frame))
+        self.ids = (robot.frame_id(frame), robot.frame_id(self.reference_frame))
 
     def measure(self, robot: Robot) -> Motion:
         """Return the motion of the frame relative to the reference frame."""
-        frame, reference = self._ids
+        frame, reference = self.ids
         Rt = robot.rotation(reference).T
         d = robot.position(frame) - robot.position(reference)
         v_f, v_r = robot.velocity(frame), robot.velocity(reference)

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from opspace.errors import InputError
 from opspace.tasks.base import TaskTerms
 from opspace.tasks.joint_layout import Layout, joint_layout
-from opspace.tasks.references.sample import Reference
+from opspace.tasks.references.sample import Reference, Sample
 from opspace.tasks.tracking import Target, TrackingTask
 from opspace.tasks.validation import Array, finite_array
 
@@ -36,6 +36,9 @@ class PostureTask(TrackingTask):
         max_speed: Norm of the joint speed that the error may ask for, rad/s.
         name: Name of the task.
 
+    Attributes:
+        layout: The joints in the robot's coordinates; None before the task is bound.
+
     Raises:
         InputError: A gain, target or list of joints that cannot be used.
     """
@@ -56,13 +59,13 @@ class PostureTask(TrackingTask):
             name, rows=0, units=(), motion_size=None, kp=kp, kv=kv, max_speed=max_speed
         )
         self._joints = None if joints is None else tuple(joints)
-        self._layout: Layout | None = None
+        self.layout: Layout | None = None
         self.target = target
 
     def evaluate(self, robot: Robot, t: float) -> TaskTerms:
         """Return the terms of the task at the robot's present state."""
         self._require_bound(robot)
-        layout = self._layout
+        layout = self.layout
         assert layout is not None  # bound
         q = robot.q
         desired = self._desired(t, lambda: q[layout.entries])
@@ -77,9 +80,15 @@ class PostureTask(TrackingTask):
             error=error,
         )
 
+    def desired(self, robot: Robot, t: float) -> Sample:
+        """See `TrackingTask.desired`."""
+        layout = self.layout
+        assert layout is not None  # bound
+        return self._desired(t, lambda: robot.q[layout.entries])
+
     def _resolve(self, robot: Robot) -> None:
         layout = joint_layout(robot, self._joints)
-        self._layout = layout
+        self.layout = layout
         self.rows = self._motion_size = len(layout.coordinates)
         self.units = layout.units
         self._recheck()
@@ -102,4 +111,4 @@ class PostureTask(TrackingTask):
     def _check_value(self, value: ArrayLike, what: str) -> Array:
         """Return the configuration entries of the selected joints."""
         values = finite_array(value, (None,), what)
-        return values if self._layout is None else self._layout.select(values, what)
+        return values if self.layout is None else self.layout.select(values, what)

@@ -140,6 +140,21 @@ class TrackingTask(Task):
         )
 
     @abstractmethod
+    def desired(self, robot: Robot, t: float) -> Sample:
+        """Return what the task follows at time ``t`` [s]; without a target, what it finds now.
+
+        Args:
+            robot: The robot given to ``bind``, updated.
+            t: Time, s.
+
+        Returns:
+            Value in the task's own form, velocity (k,) and acceleration (k,).
+
+        Raises:
+            InputError: A reference that gave unusable numbers.
+        """
+
+    @abstractmethod
     def _resolve(self, robot: Robot) -> None:
         """Look up names and sizes on a robot."""
 

@@ -1,0 +1,1 @@
+"""The tick compiled: from the robot's arrays to the torque in one call."""

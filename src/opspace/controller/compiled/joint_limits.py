@@ -1,0 +1,90 @@
+"""Joint limits of one tick, as `opspace.controller.joint_limits` finds them."""
+
+from __future__ import annotations
+
+import math
+
+from opspace.controller.compiled.layout import (
+    BUFFER,
+    LIMIT_BUFFER,
+    LIMIT_K1,
+    LIMIT_K2,
+    LIMIT_KP,
+    LIMIT_MODE,
+    LIMIT_PROFILE,
+    LIMIT_RETURN_SPEED,
+)
+from opspace.law.compiled.jit import jit
+from opspace.law.compiled.profiles import profile
+
+# Columns of Tick.limit.
+SIGN, POSITION, BRAKE, MARGIN, COMMAND = range(5)
+
+
+@jit
+def begin_limits(k):
+    """Evaluate what every limit asks for; in mode ``buffer`` also how much it takes part."""
+    for i in range(k.limit.shape[0]):
+        limit = k.limit[i]
+        j = k.limit_joint[i]
+        distance = limit[SIGN] * (limit[POSITION] - k.q[j])
+        towards = limit[SIGN] * k.v[j]
+        k.limit_h[i] = 0.0
+        k.limit_wanted[i] = -math.inf
+        if k.option[LIMIT_MODE] == BUFFER:
+            kp, buffer = k.option[LIMIT_KP], k.option[LIMIT_BUFFER]
+            limit[COMMAND] = kp * (distance - buffer) - 2.0 * math.sqrt(kp) * towards
+        else:
+            allowed, slope = _allowed_speed(k.option, distance, limit[BRAKE])
+            limit[COMMAND] = -towards * slope + k.option[LIMIT_K2] * (allowed - towards)
+
+
+@jit
+def _allowed_speed(option, d, a):
+    """v_adm(d) and its slope, see `opspace.JointLimits`."""
+    k1 = option[LIMIT_K1]
+    if d < 0.0:
+        most = option[LIMIT_RETURN_SPEED]
+        x = k1 * d / most
+        return most * math.tanh(x), k1 / math.cosh(min(-x, 300.0)) ** 2
+    knee = a / (k1 * k1)
+    if d <= knee:
+        return k1 * d, k1
+    v = math.sqrt(2.0 * a * (d - 0.5 * knee))
+    return v, a / v
+
+
+@jit
+def insert_limits(k):
+    """Find which limits take part for the accelerations found, at least as much as before.
+
+    Returns:
+        Whether anything changed.
+    """
+    changed = False
+    shape = int(k.option[LIMIT_PROFILE])
+    for i in range(k.limit.shape[0]):
+        limit = k.limit[i]
+        j = k.limit_joint[i]
+        if k.option[LIMIT_MODE] == BUFFER:
+            h, wanted = _by_position(k, limit, k.q[j], k.v[j], shape), limit[COMMAND]
+        else:
+            other = limit[SIGN] * k.joint_acceleration[j]
+            command, margin = limit[COMMAND], limit[MARGIN]
+            h = profile(shape, (other - (command - margin)) / margin)
+            h = max(h, k.limit_h[i])
+            wanted = max(min(other, command), k.limit_wanted[i])
+        if h <= 0.0:
+            continue
+        if h != k.limit_h[i] or wanted != k.limit_wanted[i]:
+            changed = True
+            k.limit_h[i], k.limit_wanted[i] = h, wanted
+    return changed
+
+
+@jit
+def _by_position(k, limit, q, v, shape):
+    towards = max(limit[SIGN] * v, 0.0)
+    inner = k.option[LIMIT_BUFFER] + towards * towards / (2.0 * limit[BRAKE])
+    distance = limit[SIGN] * (limit[POSITION] - q)
+    return profile(shape, (distance - inner) / (0.0 - inner))

@@ -1,0 +1,149 @@
+"""What a compiled tick tells, worked out when somebody asks."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from opspace.controller.command import LevelStatus, TaskStatus
+from opspace.controller.compiled.layout import SIGMA_LOWER, SIGMA_PROFILE, SIGMA_UPPER, SINGULAR
+from opspace.controller.compiled.memory import Block, reported
+from opspace.law.compiled.algebra import singular_values
+from opspace.law.compiled.jit import jit
+from opspace.law.compiled.profiles import profile
+from opspace.law.compiled.walk import slot_bit
+
+if TYPE_CHECKING:
+    from opspace.controller.compiled.plan import Plan
+
+
+class CompiledReport:
+    """Tasks, levels and limits of one tick.
+
+    Args:
+        plan: The plan of the tick.
+        memory: Copy of the block that the tick wrote.
+    """
+
+    __slots__ = ("_levels", "_memory", "_plan", "_tasks")
+
+    def __init__(self, plan: Plan, memory: np.ndarray) -> None:
+        self._plan = plan
+        self._memory = memory
+        self._tasks: dict[str, TaskStatus] | None = None
+        self._levels: tuple[LevelStatus, ...] | None = None
+
+    @property
+    def tasks(self) -> Mapping[str, TaskStatus]:
+        """Status of each task by name."""
+        if self._tasks is None:
+            self._tasks = self._task_status()
+        return self._tasks
+
+    @property
+    def levels(self) -> tuple[LevelStatus, ...]:
+        """Status of each level where there is a task, most important first."""
+        if self._levels is None:
+            self._levels = self._level_status()
+        return self._levels
+
+    @property
+    def limits(self) -> Mapping[str, float]:
+        """Activation of the joint limits that take part, by name."""
+        limits = self._plan.limits
+        if limits is None:
+            return {}
+        found = self._found()["limit_h"].tolist()
+        return {side.name: h for side, h in zip(limits.sides, found, strict=True) if h > 0.0}
+
+    def _task_status(self) -> dict[str, TaskStatus]:
+        plan, found = self._plan, self._found()
+        shares: list[dict[float, float]] = [{} for _ in plan.members]
+        for (level, i, _), share in zip(plan.places, found["share"].tolist(), strict=True):
+            if share > 0.0:
+                shares[i][level] = shares[i].get(level, 0.0) + share
+        status: dict[str, TaskStatus] = {}
+        for packed, levels, h in zip(plan.packed, shares, found["h"].tolist(), strict=True):
+            error = found["error"][packed.rows]
+            norm = float(np.sqrt(error @ error))
+            status[packed.task.name] = TaskStatus(h, tuple(sorted(levels.items())), error, norm)
+        return status
+
+    def _level_status(self) -> tuple[LevelStatus, ...]:
+        plan, found = self._plan, self._found()
+        there = {
+            place[0]
+            for place, share in zip(plan.places, found["share"].tolist(), strict=True)
+            if share > 0.0
+        }
+        return tuple(
+            self._level(found, rank, level)
+            for rank, level in enumerate(plan.levels)
+            if level in there
+        )
+
+    def _found(self) -> dict[str, np.ndarray]:
+        block = Block(0)
+        block.memory = self._memory
+        return reported(self._plan.size, block)
+
+    def _level(self, found: dict[str, np.ndarray], rank: int, level: float) -> LevelStatus:
+        plan = self._plan
+        depth = rank + 1
+        here = [s for s, place in enumerate(plan.places) if place[0] == level]
+        if found["top"][depth] <= 0.0:
+            shown = [s for s in here if found["share"][s] > 0.0]
+            members = [plan.members[plan.places[s][1]] for s in shown]
+            rows = sum(member.task.rows for member in members)
+            empty = np.zeros(0)
+            names = tuple(member.task.name for member in members)
+            return LevelStatus(level, names, empty, empty, np.zeros((rows, 0)))
+        chosen = int(found["chosen"][depth])
+        present = [s for s in here if chosen & slot_bit.py_func(s)]
+        packed = [plan.packed[plan.places[s][1]] for s in present]
+        rows = np.concatenate([np.arange(p.rows.start, p.rows.stop) for p in packed])
+        free = int(found["width"][depth])
+        sigma, activation, directions = spectrum(
+            found["Jw"], rows, found["basis"][depth], free, plan.tick.option
+        )
+        names = tuple(p.task.name for p in packed)
+        return LevelStatus(level, names, sigma, activation, directions)
+
+
+@jit
+def spectrum(Jw, rows, basis, free, option):
+    """Directions of a level, strongest first: σ, activation, and vectors as columns (Eq. 25)."""
+    m, n = rows.size, Jw.shape[1]
+    k = min(m, free)
+    wide = m <= free
+    # The smaller side is decomposed; the vectors of the rows come out on either.
+    C = np.zeros((k, max(m, free)))
+    for i in range(m):
+        for b in range(free):
+            x = 0.0
+            for a in range(n):
+                x += Jw[rows[i], a] * basis[b, a]
+            if wide:
+                C[i, b] = x
+            else:
+                C[b, i] = x
+    Y = np.zeros((k, k))
+    sigma = np.zeros(k)
+    singular_values(C, k, C.shape[1], Y, sigma)
+    directions = np.zeros((m, k))
+    activation = np.ones(k)
+    for i in range(k):
+        for a in range(m):
+            if wide:
+                directions[a, i] = Y[i, a]
+            elif sigma[i] > 0.0:
+                directions[a, i] = C[i, a] / sigma[i]
+        sigma[i] *= sigma[i]
+        if option[SINGULAR] != 0.0:
+            lower, upper = option[SIGMA_LOWER], option[SIGMA_UPPER]
+            activation[i] = profile(
+                int(option[SIGMA_PROFILE]), (sigma[i] - lower) / (upper - lower)
+            )
+    return sigma, activation, directions

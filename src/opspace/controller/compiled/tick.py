@@ -1,0 +1,339 @@
+"""One tick from the robot's arrays to the torque, see `opspace.controller.tick` for its equations."""
+
+from __future__ import annotations
+
+import math
+
+from opspace.controller.command import Status
+from opspace.controller.compiled.joint_limits import SIGN, begin_limits, insert_limits
+from opspace.controller.compiled.layout import (
+    COVERS_ALL,
+    DAMPING,
+    DONE,
+    FIRST_ROW,
+    JOINTS,
+    KIND,
+    LIMIT_WEIGHT,
+    NOT_FINITE,
+    NOT_POSITIVE_DEFINITE,
+    PROFILE,
+    ROOM,
+    ROWS,
+    SINGULAR,
+    SOLVES,
+    STATE_NOT_FINITE,
+    STATUS,
+    TASK_BIAS,
+)
+from opspace.controller.compiled.tasks import evaluate_tasks
+from opspace.law.compiled.algebra import cholesky, solve_lower, solve_lower_transposed
+from opspace.law.compiled.corners import corners, insert, sort_corners
+from opspace.law.compiled.jit import jit
+from opspace.law.compiled.level import solve_level, take_alternative
+from opspace.law.compiled.profiles import ramp
+from opspace.law.compiled.walk import begin, pass_on, slot_bit, walk
+
+LIMIT_PASSES = 4
+NO_GROUP, EXACT, CHAINED = range(3)
+FADED = int(Status.DIRECTION_OFF)
+LIMITED = int(Status.JOINT_LIMIT)
+ABOVE = int(Status.ABOVE_TORQUE_LIMIT)
+
+
+@jit
+def tick(t, k):
+    """Compute the torque for the state that the robot's arrays hold.
+
+    Args:
+        t: Time, s.
+        k: Handle of a `opspace.controller.compiled.layout.Tick`.
+
+    Returns:
+        One of the answers in ``layout``; the torque counts only where it is ``DONE``.
+    """
+    if not _finite(k.q) or not _finite(k.v):
+        return STATE_NOT_FINITE
+    activations(t, k)
+    evaluate_tasks(k)
+    n = k.v.shape[0]
+    if not cholesky(k.M, n, k.L):
+        return NOT_POSITIVE_DEFINITE
+    stacks = blend(k)
+    whiten(k)
+    law(k, stacks, 0)
+    if k.limit.shape[0] > 0:
+        begin_limits(k)
+        for _ in range(LIMIT_PASSES):
+            accelerations(k)
+            if not insert_limits(k):
+                break
+            limit_stacks = limit_corners(k)
+            law(k, stacks, limit_stacks)
+            k.found[SOLVES] = stacks * limit_stacks
+    torque(k)
+    return DONE if _finite(k.tau) else NOT_FINITE
+
+
+@jit
+def _finite(x):
+    for i in range(x.shape[0]):
+        if not math.isfinite(x[i]):
+            return False
+    return True
+
+
+@jit
+def activations(t, k):
+    """Activation of every task and every change of place, and who belongs to which group."""
+    tasks = k.kind.shape[0]
+    for i in range(k.variable.shape[0]):
+        x = k.variable[i]
+        h = ramp(t, int(x[PROFILE]), x[1], x[2], x[3], x[4], x[5], x[6], x[7], x[8])
+        if i < tasks:
+            h *= k.own[i]
+            k.h[i] = h
+        k.value[i] = h
+    exact = 0
+    for i in range(k.value.shape[0]):
+        if not 0.0 < k.value[i] < 1.0:
+            k.group[i] = NO_GROUP
+        elif k.group[i] == EXACT:
+            exact += 1
+    for i in range(k.value.shape[0]):
+        if 0.0 < k.value[i] < 1.0 and k.group[i] == NO_GROUP:
+            if exact < k.option[ROOM]:
+                k.group[i] = EXACT
+                exact += 1
+            else:
+                k.group[i] = CHAINED
+        k.chained[i] = 1 if k.group[i] == CHAINED else 0
+
+
+@jit
+def blend(k):
+    """Hard stacks between which the tasks are on their way (`opspace.stack.mixture`).
+
+    Returns:
+        Number of different stacks.
+    """
+    slots = k.slots.shape[0]
+    count = corners(k.value, k.value.shape[0], k.chained, k.corner_on, k.corner_weight, k.order)
+    for s in range(slots):
+        k.share[s] = 0.0
+    for c in range(count):
+        on = k.corner_on[c]
+        mask = 0
+        for s in range(slots):
+            if on & k.slot_off[s] != 0 or on & k.slot_place[s] != k.slot_place[s]:
+                continue
+            k.share[s] += k.corner_weight[c]
+            if on & k.slot_on[s] == k.slot_on[s]:
+                mask |= slot_bit(s)
+        k.corner_on[c] = mask
+    count = sort_corners(k.corner_on, k.corner_weight, count)
+    k.found[SOLVES] = count
+    return count
+
+
+@jit
+def whiten(k):
+    """Rows Ĵ = W J L⁻ᵀ and f̂ = W f̃ of every task, and what damps the rest."""
+    n = k.v.shape[0]
+    if k.option[TASK_BIAS] != 0.0:
+        # Eq. 3-4: f̃ = f* + η + ζ, the bias as an acceleration of each task.
+        for a in range(n):
+            k.drop[a] = k.bias[a]
+        solve_lower(k.L, n, k.drop)
+    covered = False
+    for i in range(k.kind.shape[0]):
+        whiten_task(k, i, n)
+        if k.kind[i, COVERS_ALL] != 0 and k.h[i] == 1.0:
+            covered = True
+    k.rest[n] = 0.0
+    if not covered and k.option[DAMPING] != 0.0:
+        damp_rest(k, n)
+
+
+@jit
+def whiten_task(k, i, n):
+    """Whiten the rows of task i."""
+    L, J, Jw, fw, weight = k.L, k.J, k.Jw, k.fw, k.row_weight
+    first = k.kind[i, FIRST_ROW]
+    for row in range(first, first + k.kind[i, ROWS]):
+        if k.kind[i, KIND] == JOINTS:
+            unit_row(L, n, k.coordinate[row], weight[row], Jw[row])
+        else:
+            for a in range(n):
+                Jw[row, a] = weight[row] * J[row, a]
+            solve_lower(L, n, Jw[row])
+        fw[row] = weight[row] * (k.wanted[row] - k.drift[row])
+        if k.option[TASK_BIAS] != 0.0:
+            for a in range(n):
+                fw[row] += Jw[row, a] * k.drop[a]
+
+
+@jit
+def damp_rest(k, n):
+    """q̈ = −d v of what is left, weighed by the inertia: its momentum decays at the rate d."""
+    k.rest[n] = 1.0
+    for a in range(n):
+        total = 0.0
+        for b in range(a, n):
+            total += k.L[b, a] * k.v[b]
+        k.rest[a] = -k.option[DAMPING] * total
+        if k.option[TASK_BIAS] != 0.0:
+            k.rest[a] += k.drop[a]
+
+
+@jit
+def unit_row(L, n, j, weight, row):
+    """Whitened row of joint j: weight · e_jᵀ L⁻ᵀ."""
+    for a in range(j):
+        row[a] = 0.0
+    row[j] = weight / L[j, j]
+    for a in range(j + 1, n):
+        total = 0.0
+        for b in range(j, a):
+            total -= L[a, b] * row[b]
+        row[a] = total / L[a, a]
+
+
+@jit
+def law(k, stacks, limit_stacks):
+    """û = Σ_T w_T H(T; f̃) of the stacks, under the joint limits that take part (Eq. 19-23)."""
+    n = k.v.shape[0]
+    s = k.space
+    levels = s.u.shape[0] - 1
+    for a in range(n):
+        k.u[a] = 0.0
+    begin(n, levels, s)
+    if limit_stacks == 0:
+        pass_on(0, n, s)
+        s.path[1] = 1.0
+        _walk(k, stacks, levels)
+        return
+    for c in range(limit_stacks):
+        _under_limits(k, c, stacks, levels)
+
+
+@jit
+def _walk(k, stacks, levels):
+    n = k.v.shape[0]
+    walk(
+        1, levels, n, k.slots, k.Jw, k.fw, k.corner_on, k.corner_weight, stacks,
+        k.rest, k.option, k.space, k.u,
+    )  # fmt: skip
+
+
+@jit
+def _under_limits(k, c, stacks, levels):
+    """Add the stacks below one corner of the joint limits."""
+    n = k.v.shape[0]
+    s = k.space
+    first = k.Jw.shape[0] - k.limit.shape[0]
+    count = 0
+    for i in range(k.limit.shape[0]):
+        if k.limit_on[c, i] != 0:
+            s.rows[count] = first + i
+            count += 1
+    if count == 0:
+        pass_on(0, n, s)
+        s.path[1] = k.limit_weight[c]
+        _walk(k, stacks, levels)
+        return
+    alternatives = solve_level(0, count, n, k.Jw, k.fw, False, k.option, s)
+    for i in range(alternatives):
+        share = 1.0
+        if alternatives > 1:
+            share = s.share[0, i]
+            if share <= 0.0:
+                continue
+            take_alternative(0, i, n, s)
+        s.path[1] = k.limit_weight[c] * share
+        _walk(k, stacks, levels)
+
+
+@jit
+def limit_corners(k):
+    """Rows of the joint limits that take part, and the corners of their chain.
+
+    Returns:
+        Number of corners.
+    """
+    n, count = k.v.shape[0], k.limit.shape[0]
+    first = k.Jw.shape[0] - count
+    links = 0
+    order, h, on, weight = k.limit_order, k.limit_h, k.limit_on, k.limit_weight
+    for i in range(count):
+        on[0, i] = 1 if h[i] >= 1.0 else 0
+        if h[i] > 0.0:
+            limit_row(k, i, first + i, n)
+            if h[i] < 1.0:
+                links = insert(i, h, order, links)
+    total = 0
+    before = 1.0
+    for link in range(links + 1):
+        after = h[order[link]] if link < links else 0.0
+        if before > after:
+            weight[total] = before - after
+            total += 1
+        if link < links:
+            if before > after:
+                for i in range(count):
+                    on[total, i] = on[total - 1, i]
+            on[total, order[link]] = 1
+            before = after
+    return total
+
+
+@jit
+def limit_row(k, i, row, n):
+    """Task set e_jᵀ q̈ = ± acceleration of a joint limit."""
+    weight = k.option[LIMIT_WEIGHT]
+    unit_row(k.L, n, k.limit_joint[i], weight, k.Jw[row])
+    k.fw[row] = weight * k.limit[i, SIGN] * k.limit_wanted[i]
+    if k.option[TASK_BIAS] != 0.0:
+        for a in range(n):
+            k.fw[row] += k.Jw[row, a] * k.drop[a]
+
+
+@jit
+def accelerations(k):
+    """q̈ = A⁻¹ (Γ − b − g) (Eq. 1), from û = L⁻¹ Γ."""
+    n = k.v.shape[0]
+    for a in range(n):
+        k.joint_acceleration[a] = k.u[a]
+        if k.option[TASK_BIAS] != 0.0:
+            k.joint_acceleration[a] -= k.drop[a]
+    solve_lower_transposed(k.L, n, k.joint_acceleration)
+
+
+@jit
+def torque(k):
+    """Γ = L û, with the bias where it is compensated at every joint, and what there is to report."""
+    n = k.v.shape[0]
+    for a in range(n):
+        total = 0.0
+        for b in range(a + 1):
+            total += k.L[a, b] * k.u[b]
+        if k.option[TASK_BIAS] == 0.0:
+            total += k.bias[a]
+        k.tau[a] = total
+    k.found[STATUS] = status(k)
+
+
+@jit
+def status(k):
+    """What happened, in the numbers of `opspace.Status`."""
+    bits = 0
+    if k.option[SINGULAR] != 0.0:
+        for d in range(1, k.space.u.shape[0] - 1):
+            if k.space.top[d] > 0.0 and k.space.off[d] != 0:
+                bits |= FADED
+    for i in range(k.limit.shape[0]):
+        if k.limit_h[i] > 0.0:
+            bits |= LIMITED
+    for a in range(k.tau.shape[0]):
+        if abs(k.tau[a]) > k.torque_limit[a]:
+            bits |= ABOVE
+    return bits

@@ -1,0 +1,337 @@
+"""The compiled tick against the readable one."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import opspace as osc
+from opspace.controller import Controller, ReferenceController, Singularity
+from opspace.controller.compiled.tick import tick
+from opspace.robots import available_robots, load_robot
+from opspace.scenario.build import build
+from opspace.scenario.load import load_scenario
+from opspace.sim import simulate
+from opspace.stack import Stack
+from opspace.tasks import (
+    ComTask,
+    JointBuffer,
+    JointLimits,
+    JointTask,
+    OrientationTask,
+    PoseTask,
+    PositionTask,
+    PostureTask,
+    RelativeOrientationTask,
+    RelativePoseTask,
+    RelativePositionTask,
+    Sample,
+    Task,
+    TaskTerms,
+)
+from tests.stack.arm import state, tasks_for
+from tests.stack.programs import Program, programs, running_of
+
+DT = 1e-3
+PANDA = any(info.name == "panda" and info.installed for info in available_robots())
+ROBOTS = [("puma560", "pinocchio"), ("puma560", "mujoco"), *([("panda", "pinocchio")] * PANDA)]
+
+
+def assert_same(ours, readable):
+    scale = max(1.0, float(np.max(np.abs(readable.tau))))
+    np.testing.assert_allclose(ours.tau, readable.tau, rtol=0, atol=1e-9 * scale)
+    assert ours.status == readable.status
+    assert ours.hard_solves == readable.hard_solves
+    assert list(ours.tasks) == list(readable.tasks)
+    for name, task in readable.tasks.items():
+        assert ours.tasks[name].activation == pytest.approx(task.activation, abs=1e-14)
+        assert [level for level, _ in ours.tasks[name].levels] == [n for n, _ in task.levels]
+        np.testing.assert_allclose(
+            [w for _, w in ours.tasks[name].levels], [w for _, w in task.levels], atol=1e-12
+        )
+        np.testing.assert_allclose(ours.tasks[name].error, task.error, rtol=0, atol=1e-10)
+    assert ours.limits.keys() == readable.limits.keys()
+    for name, h in readable.limits.items():
+        assert ours.limits[name] == pytest.approx(h, abs=1e-9)
+
+
+def assert_same_levels(ours, readable):
+    assert len(ours.levels) == len(readable.levels)
+    for a, b in zip(ours.levels, readable.levels, strict=True):
+        assert (a.level, a.tasks, a.directions.shape) == (b.level, b.tasks, b.directions.shape)
+        np.testing.assert_allclose(a.sigma, b.sigma, rtol=1e-8, atol=1e-9)
+        np.testing.assert_allclose(a.activation, b.activation, rtol=0, atol=1e-7)
+        # Vectors are known up to their sign only, and not at all where values coincide.
+        np.testing.assert_allclose(
+            a.directions * a.sigma @ a.directions.T, b.directions * b.sigma @ b.directions.T,
+            atol=1e-8 * max(1.0, float(np.max(b.sigma, initial=0.0))),
+        )  # fmt: skip
+
+
+class Twins:
+    """The same stack twice, run by either form on a robot of its own."""
+
+    def __init__(self, robot, make, **options):
+        name, backend = robot
+        self.stacks = [Stack(make()), Stack(make())]
+        self.ours = Controller(load_robot(name, backend=backend), self.stacks[0], **options)
+        self.readable = ReferenceController(
+            load_robot(name, backend=backend), self.stacks[1], **options
+        )
+        self.robot = self.ours.robot
+
+    def step(self, t, q, v, levels=True):
+        ours, readable = self.ours.step(t, q, v), self.readable.step(t, q, v)
+        assert_same(ours, readable)
+        if levels:
+            assert_same_levels(ours, readable)
+        return ours
+
+    def random_state(self, rng, spread=0.5):
+        n = self.robot.nv
+        return self.robot.q_reference + rng.uniform(-spread, spread, n), rng.uniform(-1, 1, n)
+
+
+class Spring(Task):
+    """A task of one's own: pulls the tool's height to 0.5 m."""
+
+    def __init__(self):
+        super().__init__("spring", rows=1, units=("m",))
+
+    def bind(self, robot):
+        self.frame = robot.frame_id(robot.tool)
+
+    def evaluate(self, robot, t):
+        height = robot.position(self.frame)[2]
+        J = robot.jacobian(self.frame)[2:3]
+        error = np.array([0.5 - height])
+        return TaskTerms(J, robot.drift(self.frame)[2:3], 50.0 * error - 5.0 * J @ robot.v, error)
+
+
+def circle(t):
+    return Sample(
+        np.array([0.4, 0.1 * np.sin(t), 0.4]),
+        np.array([0.0, 0.1 * np.cos(t), 0.0]),
+        np.array([0.0, -0.1 * np.sin(t), 0.0]),
+    )
+
+
+def frame_of(robot):
+    """A link half-way along the arm."""
+    name, backend = robot
+    return load_robot(name, backend=backend).frame_names[4]
+
+
+KINDS = {
+    "position": lambda r: [PositionTask(axes="xz", max_speed=0.3)],
+    "offset": lambda r: [PositionTask(offset=[0.1, 0.02, -0.03], target=[0.4, 0.1, 0.3])],
+    "tool axes": lambda r: [PositionTask(axes="zy", axes_frame="tool", target=[0.4, 0.1, 0.3])],
+    "orientation": lambda r: [OrientationTask(target=np.eye(3), max_speed=0.8)],
+    "turned": lambda r: [OrientationTask(axes="xy", axes_frame="tool", target=np.eye(3))],
+    "pose": lambda r: [
+        PoseTask(kp_linear=80, kp_angular=30, max_speed=(0.2, 0.5), target=np.eye(4))
+    ],
+    "pose in tool axes": lambda r: [PoseTask(axes_frame="tool", target=np.eye(4))],
+    "relative position": lambda r: [RelativePositionTask(None, frame_of(r), axes="xy")],
+    "relative orientation": lambda r: [
+        RelativeOrientationTask(None, frame_of(r), target=np.eye(3))
+    ],
+    "relative pose": lambda r: [RelativePoseTask(None, frame_of(r), target=np.eye(4))],
+    "centre of mass": lambda r: [ComTask(axes="xz", target=[0.1, 0.0, 0.4])],
+    "joint": lambda r: [JointTask(load_robot(r[0]).joint_names[2], 0.3, max_speed=0.2)],
+    "some joints": lambda r: [
+        PostureTask(joints=load_robot(r[0]).joint_names[1:4], max_speed=0.3, name="three")
+    ],
+    "reference in time": lambda r: [PositionTask(target=circle)],
+    "own": lambda r: [Spring()],
+    "several": lambda r: [
+        [PositionTask(axes="z", target=[0, 0, 0.4]), OrientationTask(axes="x")],
+        ComTask(axes="x"),
+        JointTask(load_robot(r[0]).joint_names[0], 0.2),
+    ],
+    "nothing": lambda r: [],
+}
+
+
+@pytest.mark.parametrize("robot", ROBOTS, ids="-".join)
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("posture", [True, False])
+def test_every_kind_of_task(robot, kind, posture):
+    twins = Twins(robot, lambda: [JointLimits(), *KINDS[kind](robot), *([PostureTask()] * posture)])
+    rng = np.random.default_rng(1)
+    for k in range(12):
+        twins.step(k * DT, *twins.random_state(rng))
+
+
+OPTIONS = {
+    "task bias": {"bias": "task"},
+    "no buffer": {"singularity": None},
+    "absolute buffer": {"singularity": Singularity(0.01, 0.5, scale="absolute", profile="cubic")},
+    "wide buffer": {"singularity": Singularity(0.5, 30.0, profile="half-sine")},
+    "no damping": {"damping": 0.0},
+}
+
+
+@pytest.mark.parametrize("robot", ROBOTS, ids="-".join)
+@pytest.mark.parametrize("option", OPTIONS)
+@pytest.mark.parametrize("mode", ["admissible", "buffer"])
+def test_every_option(robot, option, mode):
+    def make():
+        height = PositionTask(axes="z", name="height", target=[0, 0, 0.2])
+        height.activation = JointBuffer(load_robot(robot[0]).joint_names[1], -0.2, 0.9)
+        return [
+            JointLimits(0.5, mode=mode),
+            height,
+            [OrientationTask(), PositionTask(target=[0.6, 0, 0.6])],
+        ]
+
+    twins = Twins(robot, make, **OPTIONS[option])
+    rng = np.random.default_rng(2)
+    for k in range(25):
+        # Also where several joints are near and beyond their limits.
+        q, v = twins.random_state(rng, spread=3.0)
+        twins.step(k * DT, q, 2.0 * v)
+
+
+def test_many_joints_at_their_limits():
+    twins = Twins(ROBOTS[0], lambda: [JointLimits(), PositionTask(), PostureTask()])
+    robot = twins.robot
+    found = set()
+    rng = np.random.default_rng(3)
+    for k in range(100):
+        side = np.where(rng.random(robot.nv) < 0.5, robot.q_lower, robot.q_upper)
+        q = np.where(np.isfinite(side), side + rng.normal(0, 0.1, robot.nv), 0.0)
+        found.add(len(twins.step(k * DT, q, rng.normal(0, 1.0, robot.nv)).limits))
+    assert max(found) >= 4
+
+
+@settings(max_examples=30)
+@given(
+    steps=programs(0.002, 0.06),
+    seed=st.integers(0, 2**32 - 1),
+    blending=st.sampled_from(["auto", "idv", "chain"]),
+)
+def test_random_programs_of_requests(steps, seed, blending):
+    robot = ROBOTS[-1]
+    arms = [load_robot(robot[0]) for _ in range(2)]
+    tasks = [tasks_for(arm) for arm in arms]
+    stacks = [Stack({0: t[:1], 2: t[6:]}) for t in tasks]
+    ours = Controller(arms[0], stacks[0], blending=blending)
+    readable = ReferenceController(arms[1], stacks[1], blending=blending)
+    initial = {tasks[0][0].name: 0.0, tasks[0][6].name: 2.0}
+    plays = [Program(s, t, steps, initial, overlap=5) for s, t in zip(stacks, tasks, strict=True)]
+    q, v = state(arms[0], seed)
+    for k in range(90):
+        members = [s.begin_tick(k * DT) for s in stacks]
+        for play, present in zip(plays, members, strict=True):
+            here = {m.task.name for m in present}
+            play.play(k, here, running_of(present, k * DT))
+        t = (k + 0.5) * DT
+        a, b = ours.step(t, q, v), readable.step(t, q, v)
+        scale = max(1.0, float(np.max(np.abs(b.tau))))
+        np.testing.assert_allclose(a.tau, b.tau, rtol=0, atol=1e-9 * scale)
+        assert {n: s.levels for n, s in a.tasks.items()}.keys() == b.tasks.keys()
+        for name, task in b.tasks.items():
+            np.testing.assert_allclose(a.tasks[name].levels, task.levels, atol=1e-12)
+        q, v = q + 2e-3 * v, v * np.cos(k * 0.1)
+
+
+def test_what_is_changed_while_it_runs():
+    def make():
+        return [PositionTask(), OrientationTask(), PostureTask()]
+
+    twins = Twins(ROBOTS[-1], make)
+    q, v = state(twins.robot)
+    twins.step(0.0, q, v)
+    changes = [
+        lambda p, o, j: setattr(p, "target", [0.3, 0.2, 0.5]),
+        lambda p, o, j: p.set_target([0.3, 0.2, 0.4], [0.1, 0, 0], [0, 0, 1.0]),
+        lambda p, o, j: setattr(p, "kp", 33.0),
+        lambda p, o, j: setattr(p, "kv", 2.0),
+        lambda p, o, j: setattr(p, "max_speed", 0.1),
+        lambda p, o, j: setattr(p, "max_speed", None),
+        lambda p, o, j: setattr(p, "target", circle),
+        lambda p, o, j: setattr(p, "target", None),
+        lambda p, o, j: setattr(o, "target", np.diag([1.0, -1.0, -1.0])),
+        lambda p, o, j: setattr(o, "activation", lambda robot, t: min(1.0, 10.0 * t)),
+        lambda p, o, j: setattr(o, "activation", None),
+        lambda p, o, j: setattr(j, "kp", np.linspace(10, 20, len(q))),
+    ]
+    before = twins.step(DT, q, v).tau
+    for k, change in enumerate(changes, start=2):
+        for stack in twins.stacks:
+            change(*stack)
+        q = q + 5e-3 * v
+        after = twins.step(k * DT, q, v).tau
+        assert not np.array_equal(before, after)
+        before = after
+
+
+def test_a_rotation_past_half_a_turn_keeps_its_way():
+    twins = Twins(ROBOTS[0], lambda: [OrientationTask()])
+    q, v = twins.robot.q_reference.copy(), np.zeros(6)
+    largest = 0.0
+    for k in range(250):
+        q[0] += 0.02
+        task = twins.step(k * DT, q, v).tasks["orientation"]
+        largest = max(largest, task.error_norm)
+        if k == 100:  # a change of plan must not forget the way
+            for stack in twins.stacks:
+                stack.insert(PostureTask(), 5.0, 0.02)
+    assert largest > np.pi + 0.2
+
+
+def test_nothing_is_compiled_once_it_is_warm():
+    robot = load_robot("puma560")
+    controller = Controller(robot, Stack([PositionTask()]))
+    controller.warm_up()
+    compiled = len(tick.signatures)
+    assert controller.warm_up() == 0.0
+    for name, backend in ROBOTS:
+        twins = Twins((name, backend), lambda: [JointLimits(), PositionTask(), OrientationTask()])
+        first, second = list(twins.stacks[0]), list(twins.stacks[1])
+        for stack, tasks in zip(twins.stacks, (first, second), strict=True):
+            stack.swap(tasks[0], tasks[1], 0.005)
+            stack.insert(PostureTask(), 7.0, 0.003)
+        q, v = state(twins.robot)
+        for k in range(10):
+            twins.step(k * DT, q, v)
+    assert len(tick.signatures) == compiled == 1
+
+
+@pytest.mark.parametrize("experiment", ["singularity", "joint-limit"])
+def test_the_experiments_of_the_paper_tick_by_tick(experiment):
+    scenario = load_scenario(experiment)
+    built, readable = build(scenario), build(scenario, ReferenceController).controller
+    worst = 0.0
+
+    class Watch:
+        def observe(self, q, v, command):
+            nonlocal worst
+            assert np.isfinite(command.tau).all()
+            gap = np.max(np.abs(readable.step(command.t, q, v).tau - command.tau))
+            worst = max(worst, float(gap) / max(1.0, float(np.max(np.abs(command.tau)))))
+
+    simulate(built.plant, built.controller, 1.5, [Watch()])
+    assert worst < 1e-9
+
+
+def test_a_task_of_ones_own_that_gives_nonsense_is_refused():
+    class Broken(Spring):
+        def evaluate(self, robot, t):
+            terms = super().evaluate(robot, t)
+            return TaskTerms(terms.J, terms.drift, terms.acceleration * np.nan, terms.error)
+
+    controller = Controller(load_robot("puma560"), Stack([Broken()]))
+    with pytest.raises(osc.InputError, match=r"'spring'.*finite"):
+        controller.step(0.0, controller.robot.q_reference, np.zeros(6))
+
+
+def test_more_tasks_than_there_are_bits_take_the_readable_form():
+    robot = load_robot("puma560")
+
+    def make():
+        return [PositionTask(axes="z", name=f"height{k}") for k in range(40)]
+
+    twins = Twins(ROBOTS[0], make)
+    twins.step(0.0, robot.q_reference, np.full(6, 0.1))
