@@ -3,14 +3,16 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 INSTALLED := $(VENV)/.installed
+BENCH := .venv-bench
 
-.PHONY: help test lint test-slow reproduce comparison constraints clean
+.PHONY: help test lint test-slow reproduce comparison bench constraints clean
 
 help:
 	@echo "make reproduce   the two experiments of the paper: tables and figures in results/"
 	@echo "make test        lint, types, import rules and the default test suite"
 	@echo "make test-slow   campaigns that take minutes"
 	@echo "make comparison  run other methods on the show-piece; rewrites the tables in the documents"
+	@echo "make bench       time the tick beside other controllers, in an environment of its own"
 	@echo "make constraints pin the versions that the tests cover"
 	@echo "make clean       remove the environment and everything that was made"
 
@@ -38,8 +40,17 @@ reproduce: $(INSTALLED)
 comparison: $(INSTALLED)
 	$(BIN)/python docs/evidence/comparison.py
 
+# The peers fix older versions of the dynamics library than the tests cover.
+$(BENCH)/.installed: pyproject.toml $(INSTALLED)
+	$(PYTHON) -m venv $(BENCH)
+	$(BIN)/uv pip install --quiet --python $(BENCH)/bin/python --editable '.[all,bench]'
+	@touch $@
+
+bench: $(BENCH)/.installed
+	$(BENCH)/bin/opspace bench --core 0 --out results/bench
+
 constraints: $(INSTALLED)
-	$(BIN)/uv pip compile --quiet --universal --upgrade --python-version 3.10 --all-extras --no-header --no-annotate --no-emit-index-url --output-file constraints.txt pyproject.toml
+	$(BIN)/uv pip compile --quiet --universal --upgrade --python-version 3.10 --extra all --extra test --no-header --no-annotate --no-emit-index-url --output-file constraints.txt pyproject.toml
 
 clean:
-	rm -rf $(VENV) results dist build .pytest_cache .ruff_cache .hypothesis
+	rm -rf $(VENV) $(BENCH) results dist build .pytest_cache .ruff_cache .hypothesis

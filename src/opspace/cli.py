@@ -239,6 +239,41 @@ def compare(
     print(f"results: {out}")
 
 
+@app.command(epilog="Example: opspace bench panda ur5 --core 0 --against results/bench/before.json")
+def bench(
+    scenes: Annotated[
+        list[str] | None, typer.Argument(help="Names of scenes. [default: all]", metavar="SCENE")
+    ] = None,
+    ticks: Annotated[int, typer.Option(help="Ticks of every subject.")] = 4000,
+    core: Annotated[int | None, typer.Option(help="Stay on this core.")] = None,
+    readable: Annotated[
+        bool, typer.Option("--readable", help="Time the readable form of the tick as well.")
+    ] = False,
+    against: Annotated[
+        Path | None, typer.Option(help="JSON file of an earlier run to compare with.")
+    ] = None,
+    out: Annotated[Path, typer.Option(help="Directory to write to.")] = Path("results/bench"),
+) -> None:
+    """Time the tick, in turns with the model's own calls and with other controllers."""
+    from opspace.bench import SCENES, Benchmark, compare_runs, run_benchmark
+    from opspace.plots import save
+    from opspace.plots.benchmark import benchmark_figure
+
+    before = None if against is None else Benchmark.load(against)
+
+    def announce(name: str) -> None:
+        print(f"{name}: {SCENES[name].title}", file=sys.stderr)
+
+    found = run_benchmark(scenes or (), ticks, core, readable=readable, announce=announce)
+    _print_table(*found.table())
+    if before is not None:
+        print()
+        _print_table(*compare_runs(before, found))
+    found.save(out / "bench.json")
+    save(benchmark_figure(found.scenes), out / "bench.png")
+    print(f"results: {out}")
+
+
 @app.command(epilog="Example: opspace check ur5")
 def check(
     robot: Annotated[str, typer.Argument(help="Name of a robot, or path of a .urdf or .xml file.")],

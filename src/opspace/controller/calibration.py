@@ -9,6 +9,7 @@ import numpy as np
 
 from opspace.robots.protocol import Robot
 from opspace.tasks import Task
+from opspace.tasks.motion_task import MotionTask
 
 SAMPLES = 200
 UNKNOWN_BRAKE = 20.0
@@ -16,6 +17,9 @@ UNKNOWN_BRAKE = 20.0
 BRAKE_RANGE = (2.0, 50.0)
 """Braking accelerations outside are not believed: the first is a joint that can hardly hold its own
 weight in some posture, the second a wrist that other joints could not follow."""
+
+STRUCTURAL = 1e-6
+"""An eigenvalue below this fraction is zero in every posture: the arm has too few joints."""
 
 
 @dataclass(frozen=True)
@@ -26,9 +30,9 @@ class Calibration:
         brake: (n,) acceleration that half of the torque left by gravity gives each joint alone, the
             least over the workspace, rad/s².
         joint_sigma: Smallest eigenvalue of A⁻¹ over the workspace, 1/(kg·m²).
-        references: Per name of a task that was in the stack at the start (m,): the median over the
-            workspace of the smallest eigenvalue of the task's own J A⁻¹ Jᵀ, one value for its rows
-            in m and one for those in rad, 1/kg and 1/(kg·m²).
+        references: Per name of a task that was in the stack at the start (m,): what is usual for the
+            smallest eigenvalue of the task's J A⁻¹ Jᵀ, one value for its rows in m and one for those
+            in rad, 1/kg and 1/(kg·m²), see `Workspace.reference`.
     """
 
     brake: np.ndarray
@@ -61,22 +65,43 @@ class Workspace:
         self.joint_sigma = joint_sigma
 
     def reference(self, task: Task) -> np.ndarray:
-        """Take the scale of a task's rows, see `Calibration`.
+        """Take the scale of a task's rows: what is usual for their smallest eigenvalue σ.
+
+        It is the median over the workspace of σ, for rows in m and for rows in rad. How well a frame
+        turns depends on whether its origin is held meanwhile: on a long arm σ then is up to forty
+        times smaller. Rows in rad take twice the median with the origin held where that is less, so
+        that an orientation below a position is not taken for singular in ordinary postures. A task
+        with both kinds of rows is scaled once more by the median σ of all of them together.
 
         Args:
             task: A task that no tick is using; it is left bound to a copy of the robot.
 
         Returns:
-            (m,) medians of the smallest eigenvalue, 1/kg or 1/(kg·m²).
+            (m,) references, 1/kg or 1/(kg·m²).
         """
         robot = self._robot
         task.bind(robot)
-        smallest: list[np.ndarray] = []
+        alone: list[np.ndarray] = []
+        held: list[float] = []
+        everything: list[np.ndarray] = []
+        angular = np.array(task.units) == "rad"
         for q, inverse in self._visited:
             robot.update(q, np.zeros(robot.nv))
             J = task.evaluate(robot, 0.0).J
-            smallest.append(_smallest_per_unit(task, J @ inverse @ J.T))
-        return np.median(smallest, axis=0)
+            everything.append(J @ inverse @ J.T)
+            alone.append(_smallest_per_unit(task, everything[-1]))
+            if isinstance(task, MotionTask) and angular.any():
+                origin = task.source.measure(robot).J[:3]
+                held.append(_smallest_while_held(J[angular], origin, inverse))
+        reference = np.median(alone, axis=0)
+        if held and np.median(held) > STRUCTURAL * reference[angular][0]:
+            reference[angular] = np.minimum(reference[angular], 2.0 * np.median(held))
+        if angular.any() and not angular.all():
+            weight = np.sqrt(np.outer(reference, reference))
+            together = np.median([np.linalg.eigvalsh(S / weight)[0] for S in everything])
+            if together > STRUCTURAL:
+                reference = reference * together
+        return reference
 
 
 def sample_postures(robot: Robot) -> Iterator[np.ndarray]:
@@ -105,3 +130,12 @@ def _smallest_per_unit(task: Task, inverse_inertia: np.ndarray) -> np.ndarray:
         # A task of one's own may have rows that depend on each other in every posture.
         result[rows] = max(sigma[0], 1e-6 * sigma[-1], np.finfo(float).tiny)
     return result
+
+
+def _smallest_while_held(J: np.ndarray, held: np.ndarray, inverse: np.ndarray) -> float:
+    """Smallest eigenvalue of J A⁻¹ Nᵀ Jᵀ in the motions that leave the rows ``held`` alone."""
+    basis = np.linalg.cholesky(inverse)
+    _, s, Vt = np.linalg.svd(held @ basis)
+    free = Vt[int(np.sum(s > 1e-9 * s[0])) :]
+    projected = J @ basis @ free.T
+    return float(np.linalg.eigvalsh(projected @ projected.T)[0])

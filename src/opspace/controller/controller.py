@@ -10,13 +10,13 @@ from numpy.typing import ArrayLike
 from opspace.controller.command import Command, Status
 from opspace.controller.compiled.layout import (
     DAMPING,
-    DONE,
     OPTION_SIZE,
     ROOM,
     SIGMA_LOWER,
     SIGMA_PROFILE,
     SIGMA_UPPER,
     SINGULAR,
+    SOLVE,
     STATE_NOT_FINITE,
     TASK_BIAS,
 )
@@ -72,15 +72,14 @@ class Controller(ReferenceController):
             plan = self._plan = self._planned(members, axes)
         plan.refresh(robot, t)
         answer = tick(t, plan.handle)
-        if answer != DONE:
+        if answer < 0:
             return self._not_done(answer, t, q, v)
         found = plan.memory.copy()
-        solves, status = found[plan.found].tolist()
         return Command(
             t,
-            found[: axes.v.size],
-            STATUSES[int(status)],
-            int(solves),
+            found[: plan.n],
+            STATUSES[answer % SOLVE],
+            answer // SOLVE,
             CompiledReport(plan, found),
         )
 

@@ -100,7 +100,9 @@ class PinocchioRobot(AdapterBase):
         return q[self._to_pin] if self._to_pin is not None else q
 
     def _compute(self) -> None:
-        model, data, q = self._model, self._data, self._order(self._q)
+        model, data, q = self._model, self._data, self._q
+        if self._to_pin is not None:
+            q = q[self._to_pin]
         self._q_pin = q
         self._accelerations_known = False
         nonlinear_effects(model, data, q, self._v)

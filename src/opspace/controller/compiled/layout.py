@@ -73,12 +73,9 @@ VARIABLE_SIZE = 9
 ) = range(15)
 OPTION_SIZE = 15
 
-# Entries of Tick.found.
-SOLVES, STATUS = range(2)
-FOUND_SIZE = 2
-
-# What a tick may answer.
-DONE, STATE_NOT_FINITE, NOT_FINITE, NOT_POSITIVE_DEFINITE = range(4)
+# What a tick answers when there is no torque, and what a hard torque counts in its answer.
+STATE_NOT_FINITE, NOT_FINITE, NOT_POSITIVE_DEFINITE = -1, -2, -3
+SOLVE = 256
 
 
 class Tick(NamedTuple):
@@ -99,7 +96,7 @@ class Tick(NamedTuple):
     margin) of joint limits; ``torque_limit``; ``option``.
 
     What it writes, all in one block of memory: ``tau``, ``h`` of each task, ``share`` of each slot,
-    ``error`` and ``wanted`` of each row, ``limit_h``, ``limit_wanted``, ``found``, and for the
+    ``error`` and ``wanted`` of each row, ``limit_h``, ``limit_wanted``, and for the
     report of the levels ``Jw`` (rows, n), whitened, and the memory of the walk.
 
     The rest is scratch.
@@ -141,7 +138,6 @@ class Tick(NamedTuple):
     wanted: np.ndarray
     limit_h: np.ndarray
     limit_wanted: np.ndarray
-    found: np.ndarray
     Jw: np.ndarray
     J: np.ndarray
     drift: np.ndarray
@@ -214,7 +210,6 @@ def tick_handle(t, space):
         t.wanted,
         t.limit_h,
         t.limit_wanted,
-        t.found,
         t.Jw,
         t.J,
         t.drift,

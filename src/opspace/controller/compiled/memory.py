@@ -7,7 +7,6 @@ from typing import NamedTuple
 import numpy as np
 
 from opspace.controller.compiled.layout import (
-    FOUND_SIZE,
     KIND_SIZE,
     NUMBERS_SIZE,
     VARIABLE_SIZE,
@@ -69,7 +68,6 @@ def reported(size: Sizes, block: Block) -> dict[str, np.ndarray]:
         "share": block.take(size.slots),
         "error": block.take(size.rows),
         "limit_h": block.take(size.limits),
-        "found": block.take(FOUND_SIZE),
         "top": block.take(size.levels + 2),
         "chosen": block.take_integers(size.levels + 2),
         "width": block.take_integers(size.levels + 2),
@@ -93,12 +91,6 @@ def reported_size(size: Sizes) -> int:
         + rows * n
         + (depth * n * n)
     )
-
-
-def place_of_found(size: Sizes) -> slice:
-    """Where in the block a tick says what happened."""
-    before = size.n + size.tasks + size.slots + size.rows + size.limits
-    return slice(before, before + FOUND_SIZE)
 
 
 def make_tick(

@@ -20,7 +20,7 @@ from opspace.controller.compiled.layout import (
     Tick,
     tick_handle,
 )
-from opspace.controller.compiled.memory import Sizes, make_tick, place_of_found
+from opspace.controller.compiled.memory import Sizes, make_tick
 from opspace.controller.compiled.packing import Packed
 from opspace.controller.options import Scales
 from opspace.law.compiled.profiles import PROFILE_CODE
@@ -61,6 +61,7 @@ class Plan:
         self.members = members
         self.axes = axes
         self.limits = limits
+        self.n = axes.v.size
         self.variables: list[Member | Variable] = [*members, *_arrivals(members)]
         self.levels = sorted({place.level for m in members for place in m.places})
         self.places = sorted(
@@ -77,7 +78,6 @@ class Plan:
             limits=0 if limits is None else len(limits.sides),
             corners=_most_corners(len(self.variables), room),
         )
-        self.found = place_of_found(self.size)
         self.tick, space, self.memory = make_tick(self.size, axes, torque_limit, options)
         self.packed = self._pack(scales)
         self._pack_variables()

@@ -9,7 +9,6 @@ from opspace.controller.compiled.joint_limits import SIGN, begin_limits, insert_
 from opspace.controller.compiled.layout import (
     COVERS_ALL,
     DAMPING,
-    DONE,
     FIRST_ROW,
     JOINTS,
     KIND,
@@ -20,9 +19,8 @@ from opspace.controller.compiled.layout import (
     ROOM,
     ROWS,
     SINGULAR,
-    SOLVES,
+    SOLVE,
     STATE_NOT_FINITE,
-    STATUS,
     TASK_BIAS,
 )
 from opspace.controller.compiled.tasks import evaluate_tasks
@@ -49,7 +47,8 @@ def tick(t, k):
         k: Handle of a `opspace.controller.compiled.layout.Tick`.
 
     Returns:
-        One of the answers in ``layout``; the torque counts only where it is ``DONE``.
+        One of the answers in ``layout``, negative; or what happened in the numbers of
+        `opspace.Status` plus ``layout.SOLVE`` times the number of hard torques.
     """
     if not _finite(k.q) or not _finite(k.v):
         return STATE_NOT_FINITE
@@ -61,6 +60,7 @@ def tick(t, k):
     stacks = blend(k)
     whiten(k)
     law(k, stacks, 0)
+    solves = stacks
     if k.limit.shape[0] > 0:
         begin_limits(k)
         for _ in range(LIMIT_PASSES):
@@ -69,9 +69,9 @@ def tick(t, k):
                 break
             limit_stacks = limit_corners(k)
             law(k, stacks, limit_stacks)
-            k.found[SOLVES] = stacks * limit_stacks
+            solves = stacks * limit_stacks
     torque(k)
-    return DONE if _finite(k.tau) else NOT_FINITE
+    return status(k) + SOLVE * solves if _finite(k.tau) else NOT_FINITE
 
 
 @jit
@@ -130,9 +130,7 @@ def blend(k):
             if on & k.slot_on[s] == k.slot_on[s]:
                 mask |= slot_bit(s)
         k.corner_on[c] = mask
-    count = sort_corners(k.corner_on, k.corner_weight, count)
-    k.found[SOLVES] = count
-    return count
+    return sort_corners(k.corner_on, k.corner_weight, count)
 
 
 @jit
@@ -310,7 +308,7 @@ def accelerations(k):
 
 @jit
 def torque(k):
-    """Γ = L û, with the bias where it is compensated at every joint, and what there is to report."""
+    """Γ = L û, with the bias where it is compensated at every joint."""
     n = k.v.shape[0]
     for a in range(n):
         total = 0.0
@@ -319,7 +317,6 @@ def torque(k):
         if k.option[TASK_BIAS] == 0.0:
             total += k.bias[a]
         k.tau[a] = total
-    k.found[STATUS] = status(k)
 
 
 @jit

@@ -16,6 +16,9 @@ SOURCES = [
     for path in sorted((Path(__file__).parents[2] / part / "compiled").glob("*.py"))
 ]
 
+FAST = {"reassoc", "contract"}
+"""Sums may be taken in another order, four at a time; inf and nan stay what they are."""
+
 
 def _stamp() -> tuple[float, int]:
     """Newest change and total size of everything that is compiled."""
@@ -32,7 +35,9 @@ def jit(function: Callable[..., Any]) -> Any:
     What is kept counts as old when any compiled source has changed: by itself numba looks at the
     file of the function alone, not at those of the functions that it calls.
     """
-    compiled = numba.njit(cache=True, error_model="numpy")(function)
+    compiled: Any = numba.njit(cache=True, error_model="numpy", fastmath={"reassoc", "contract"})(
+        function
+    )
     compiled._cache._cache_file._source_stamp = STAMP
     return compiled
 

@@ -103,16 +103,51 @@ def _solve_wide(d, m, n, r, last, bound, s):
     for i in range(m):
         x[i] = residual[i]
     solve_upper_transposed(R, m, x)
+    s.free[d + 1] = r - m
+    if not last and r - m > m:
+        _turn_basis(d, m, n, r, s)
+        return True
     for i in range(m, r):
         x[i] = 0.0
     apply_reflectors(B, m, r, scale, x)
-    Z = s.Z
-    _step(d, n, r, Z, x, s.u)
-    s.free[d + 1] = r - m
+    _step(d, n, r, s.Z[d], x, s.u)
     if not last:
         for j in range(m, r):
-            _complement(m, n, r, j, B, scale, x, Z[d], Z[d + 1, j - m])
+            _complement(m, n, r, j, B, scale, x, s.Z[d], s.Z[d + 1, j - m])
     return True
+
+
+@jit
+def _turn_basis(d, m, n, r, s):
+    """Step along the first m vectors of the basis turned by Qᵀ; the others are what is left free.
+
+    The same as column by column, and cheaper where many columns are left.
+    """
+    turned, Z = s.V[d], s.Z[d + 1]
+    _turn(m, n, r, s.B, s.scale, s.Z[d], turned, s.y)
+    _step(d, n, m, turned, s.x, s.u)
+    for j in range(m, r):
+        for a in range(n):
+            Z[j - m, a] = turned[j, a]
+
+
+@jit
+def _turn(m, n, r, B, scale, Z, turned, w):
+    """Qᵀ Z: the basis turned so that its first m vectors are those that the rows use."""
+    for b in range(r):
+        for a in range(n):
+            turned[b, a] = Z[b, a]
+    for k in range(m):
+        for a in range(n):
+            w[a] = 0.0
+        for b in range(k, r):
+            factor = B[k, b]
+            for a in range(n):
+                w[a] += factor * turned[b, a]
+        for b in range(k, r):
+            factor = scale[k] * B[k, b]
+            for a in range(n):
+                turned[b, a] -= factor * w[a]
 
 
 @jit
@@ -130,19 +165,20 @@ def _solve_tall(d, m, n, r, bound, s):
         x[i] = residual[i]
     apply_reflectors_transposed(C, r, m, scale, x)
     solve_upper(R, r, x)
-    _step(d, n, r, s.Z, x, s.u)
+    _step(d, n, r, s.Z[d], x, s.u)
     s.free[d + 1] = 0
     return True
 
 
 @jit
-def _step(d, n, r, Z, x, u):
-    """û_l = û_{l−1} + Z x."""
+def _step(d, n, count, vectors, x, u):
+    """û_l = û_{l−1} + Σ x_b vectors_b."""
     for a in range(n):
-        total = u[d, a]
-        for b in range(r):
-            total += Z[d, b, a] * x[b]
-        u[d + 1, a] = total
+        u[d + 1, a] = u[d, a]
+    for b in range(count):
+        factor = x[b]
+        for a in range(n):
+            u[d + 1, a] += factor * vectors[b, a]
 
 
 @jit
@@ -153,10 +189,11 @@ def _complement(m, n, r, j, B, scale, x, Z, vector):
     x[j] = 1.0
     apply_reflectors(B, m, r, scale, x)
     for a in range(n):
-        total = 0.0
-        for b in range(r):
-            total += Z[b, a] * x[b]
-        vector[a] = total
+        vector[a] = 0.0
+    for b in range(r):
+        factor = x[b]
+        for a in range(n):
+            vector[a] += factor * Z[b, a]
 
 
 @jit
@@ -246,10 +283,11 @@ def _directions(d, m, n, r, rank, s):
         if wide:
             apply_reflectors(B, m, r, scale, x)
         for a in range(n):
-            total = 0.0
-            for b in range(r):
-                total += Z[d, b, a] * x[b]
-            V[d, i, a] = total
+            V[d, i, a] = 0.0
+        for b in range(r):
+            factor = x[b]
+            for a in range(n):
+                V[d, i, a] += factor * Z[d, b, a]
     for j in range(rank, r):
         _complement(m, n, r, j, B, scale, x, Z[d], V[d, j])
 

@@ -1,0 +1,180 @@
+"""What is timed: a robot, a stack of tasks, and the same wish put to other controllers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+
+import numpy as np
+
+from opspace.controller import Controller, ReferenceController, Singularity
+from opspace.controller.options import DEFAULT_SINGULARITY
+from opspace.errors import missing_extra
+from opspace.robots import load_robot
+from opspace.robots.catalogue import CATALOGUE, locate
+from opspace.robots.loading import read_robot
+from opspace.robots.protocol import Robot
+from opspace.stack import Stack
+from opspace.tasks import (
+    JointLimits,
+    JointTask,
+    OrientationTask,
+    PoseTask,
+    PositionTask,
+    PostureTask,
+    Task,
+)
+
+PANDA_HOME = (0.0, -0.785, 0.0, -2.356, 0.0, 1.571, 0.785)
+UR_HOME = (0.0, -1.57, 1.57, -1.57, -1.57, 0.0)
+STATES = 64
+"""States on a closed path that a scene is timed at."""
+
+Level = tuple[Task, ...]
+
+
+@dataclass(frozen=True)
+class Scene:
+    """A robot and its tasks.
+
+    Attributes:
+        title: What is in it.
+        robot: Gives the robot.
+        home: Posture in the middle of the states; None is the robot's reference posture.
+        levels: Gives the tasks, most important first.
+        limits: Whether joint limits are kept.
+        singularity: Buffer for singular directions, or None.
+        transitions: How many tasks are on their way in all the time.
+        blending: How they are blended.
+        peers: Whether other controllers are asked for the same.
+    """
+
+    title: str
+    robot: Callable[[], Robot]
+    levels: Callable[[], list[Level]]
+    home: tuple[float, ...] | None = None
+    limits: bool = True
+    singularity: Singularity | None = DEFAULT_SINGULARITY
+    transitions: int = 0
+    blending: str = "auto"
+    peers: bool = True
+
+    def controller(self, kind: type[ReferenceController] = Controller) -> ReferenceController:
+        """Build the library's controller, with its transitions begun."""
+        robot = self.robot()
+        levels = [list(level) for level in self.levels()]
+        stack = Stack(levels, limits=JointLimits() if self.limits else None)
+        found = kind(robot, stack, singularity=self.singularity, blending=self.blending)
+        moving = [task for level in levels for task in level][: self.transitions]
+        if moving:
+            q, v = self.states(robot)
+            found.step(0.0, q[0], v[0])
+            for k, task in enumerate(moving):
+                stack.remove(task, 2.0 * self.time * (1.0 + 0.1 * k), profile="linear")
+            found.step(1e-3, q[0], v[0])
+        return found
+
+    @property
+    def time(self) -> float:
+        """Time of every tick, s: the transitions are then half-way, each elsewhere."""
+        return 1e9 if self.transitions else 0.0
+
+    def states(self, robot: Robot) -> tuple[np.ndarray, np.ndarray]:
+        """Give `STATES` configurations and velocities on a closed path around home."""
+        home = robot.q_reference if self.home is None else np.array(self.home)
+        rng = np.random.default_rng(0)
+        phase = rng.uniform(0.0, 2.0 * np.pi, robot.nv)
+        angle = 2.0 * np.pi * np.arange(STATES)[:, None] / STATES + phase
+        return home + 0.05 * np.sin(angle), 0.1 * np.cos(angle)
+
+
+def _humanoid() -> Robot:
+    path = locate(CATALOGUE["talos"])
+    if path is None:
+        raise missing_extra("example-robot-data", "robots")
+    file = read_robot(path, "pinocchio", floating_base=False)
+    return file.build(file.description)
+
+
+def _humanoid_levels() -> list[Level]:
+    right, left = "wrist_right_ft_tool_link", "wrist_left_ft_tool_link"
+    return [
+        (PoseTask(right, name="right hand"),),
+        (PoseTask(left, name="left hand"),),
+        (OrientationTask("head_2_link", name="head"),),
+        (PositionTask("leg_left_6_link", name="left foot"),),
+        (PostureTask(),),
+    ]
+
+
+def _chain(k: int, blending: str) -> Scene:
+    def levels() -> list[Level]:
+        joints = load_robot("panda").joint_names
+        moving: list[Level] = [
+            (PositionTask(axes=axis, name=f"position {axis}"),) for axis in "xyz"
+        ]
+        moving += [(JointTask(joint),) for joint in joints[:5]]
+        return [*moving, (PostureTask(),)]
+
+    return Scene(
+        f"Panda, eight tasks of one row above posture, {k} on their way, {blending}",
+        lambda: load_robot("panda"),
+        levels,
+        PANDA_HOME,
+        transitions=k,
+        blending=blending,
+        peers=False,
+    )
+
+
+def _panda(everything: bool) -> Scene:
+    return Scene(
+        f"Panda, pose above posture{'' if everything else ', no limits, no singular directions'}",
+        lambda: load_robot("panda"),
+        lambda: [(PoseTask(),), (PostureTask(),)],
+        PANDA_HOME,
+        limits=everything,
+        singularity=DEFAULT_SINGULARITY if everything else None,
+    )
+
+
+def _ur5(everything: bool) -> Scene:
+    plain = "" if everything else ", no limits, no singular directions"
+    return Scene(
+        f"UR5, orientation above position{plain}",
+        lambda: load_robot("ur5"),
+        lambda: [(OrientationTask(),), (PositionTask(),)],
+        UR_HOME,
+        limits=everything,
+        singularity=DEFAULT_SINGULARITY if everything else None,
+    )
+
+
+SCENES: Mapping[str, Scene] = MappingProxyType(
+    {
+        "panda": _panda(True),
+        "panda-plain": _panda(False),
+        "ur5": _ur5(True),
+        "ur5-plain": _ur5(False),
+        "puma": Scene(
+            "PUMA 560, orientation above position above posture",
+            lambda: load_robot("puma560"),
+            lambda: [(OrientationTask(),), (PositionTask(),), (PostureTask(),)],
+        ),
+        "puma-mujoco": Scene(
+            "PUMA 560 by MuJoCo, orientation above position above posture",
+            lambda: load_robot("puma560", backend="mujoco"),
+            lambda: [(OrientationTask(),), (PositionTask(),), (PostureTask(),)],
+            peers=False,
+        ),
+        "humanoid": Scene(
+            "Talos fixed at the pelvis (30 joints), two hands, head, a foot, posture: 5 levels",
+            _humanoid,
+            _humanoid_levels,
+        ),
+        **{f"chain-{k}": _chain(k, "chain") for k in (0, 1, 2, 4, 8)},
+        **{f"idv-{k}": _chain(k, "idv") for k in (1, 2, 3)},
+    }
+)
+"""Scenes by name."""

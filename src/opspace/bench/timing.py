@@ -1,0 +1,82 @@
+"""Time functions side by side."""
+
+from __future__ import annotations
+
+import gc
+import os
+from collections.abc import Mapping
+from contextlib import contextmanager
+from time import perf_counter_ns
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from opspace.errors import InputError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from opspace.bench.subjects import Tick
+
+BLOCK = 500
+"""Ticks of one subject before the next one has its turn: clocks change, and all must feel it."""
+
+
+@contextmanager
+def pinned(core: int | None) -> Iterator[None]:
+    """Run on one core, where the system lets us.
+
+    Raises:
+        InputError: There is no such core.
+    """
+    if core is None or not hasattr(os, "sched_setaffinity"):
+        yield
+        return
+    before = os.sched_getaffinity(0)
+    if core not in before:
+        raise InputError(f"there is no core {core} to use (valid: {sorted(before)})")
+    os.sched_setaffinity(0, {core})
+    try:
+        yield
+    finally:
+        os.sched_setaffinity(0, before)
+
+
+def interleaved(
+    ticks: Mapping[str, Tick],
+    q: np.ndarray,
+    v: np.ndarray,
+    count: int,
+) -> dict[str, np.ndarray]:
+    """Time every subject tick by tick, in turns of `BLOCK`.
+
+    Args:
+        ticks: Subjects by name.
+        q: (states, n) configurations that are gone through.
+        v: (states, n) velocities.
+        count: Ticks of each.
+
+    Returns:
+        By name (count,) durations, µs.
+    """
+    states = list(zip(q, v, strict=True))
+    found = {name: np.zeros(count) for name in ticks}
+    for tick in ticks.values():
+        _block(tick, states, np.zeros(BLOCK))
+    gc.collect()
+    for start in range(0, count, BLOCK):
+        end = min(start + BLOCK, count)
+        for name, tick in ticks.items():
+            _block(tick, states, found[name][start:end])
+    return found
+
+
+def _block(tick: Tick, states: list[tuple[np.ndarray, np.ndarray]], into: np.ndarray) -> None:
+    many = len(states)
+    durations = [0] * into.size
+    for i in range(into.size):
+        q, v = states[i % many]
+        start = perf_counter_ns()
+        tick(q, v)
+        durations[i] = perf_counter_ns() - start
+    into[:] = np.array(durations) * 1e-3
