@@ -56,7 +56,12 @@ def _bars(panel: Axes, scenes: Times) -> None:
     panel.set_yticks(places, names)
     panel.invert_yaxis()
     longest = max(found["p50"] for times in scenes.values() for found in times.values())
-    panel.set_xlim(0.0, 1.75 * longest)
+    shortest = min(found["p50"] for times in scenes.values() for found in times.values())
+    if longest > 30.0 * shortest:
+        panel.set_xscale("log")
+        panel.set_xlim(0.5 * shortest, longest * (longest / shortest) ** 0.5)
+    else:
+        panel.set_xlim(0.0, 1.75 * longest)
 
 
 def _lines(panel: Axes, scenes: Times) -> None:

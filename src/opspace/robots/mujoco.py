@@ -11,6 +11,7 @@ import numpy as np
 from opspace.robots.base import AdapterBase
 from opspace.robots.description import Description
 from opspace.robots.motion_axes import FramePlace, MassPoint, MotionAxes
+from opspace.robots.world_axes import placements, world_axes
 
 
 class MujocoRobot(AdapterBase):
@@ -42,7 +43,17 @@ class MujocoRobot(AdapterBase):
         self._bias_view.setflags(write=False)
         self._axes = np.zeros((self.nv, 6))
         self._placement = np.zeros((model.nbody + model.nsite, 12))
-        self._origins = _dof_origins(model)
+        self._origins = np.array(model.body_rootid[model.dof_bodyid], dtype=np.int64)
+        data = self._data
+        # Held once: an attribute of the data costs as much as some of the mathematics.
+        self._views = (
+            data.cdof,
+            data.subtree_com,
+            data.xmat,
+            data.xpos,
+            data.site_xmat,
+            data.site_xpos,
+        )
         self.update(self.q_reference, np.zeros(self.nv))
 
     @property
@@ -121,19 +132,10 @@ class MujocoRobot(AdapterBase):
         self._fill_axes()
 
     def _fill_axes(self) -> None:
-        """Bring MuJoCo's motion axes, about the centre of mass of each tree, to the world's origin."""
-        data, axes = self._data, self._axes
-        turn = data.cdof[:, :3]
-        axes[:, 3:] = turn
-        axes[:, :3] = data.cdof[:, 3:] + np.cross(data.subtree_com[self._origins], turn)
-        bodies = self._model.nbody
-        placement = self._placement
-        for rows, R, p in (
-            (slice(0, bodies), data.xmat, data.xpos),
-            (slice(bodies, None), data.site_xmat, data.site_xpos),
-        ):
-            placement[rows, :9] = R.reshape(-1, 3, 3).transpose(0, 2, 1).reshape(-1, 9)
-            placement[rows, 9:] = p
+        cdof, com, xmat, xpos, site_xmat, site_xpos = self._views
+        world_axes(cdof, self._origins, com, self._axes)
+        placements(0, xmat, xpos, self._placement)
+        placements(self._model.nbody, site_xmat, site_xpos, self._placement)
 
     def _gravity(self, _: int) -> np.ndarray:
         # g(q) = -sum_i m_i J_i^T g, which is the whole mass at the centre of mass.
@@ -184,8 +186,3 @@ def _site(model: mujoco.MjModel, name: str) -> int:
     """Return the id of the site of this name, or -1 where a body has it."""
     is_body = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, name) >= 0
     return -1 if is_body else mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SITE, name)
-
-
-def _dof_origins(model: mujoco.MjModel) -> np.ndarray:
-    """Return the body whose subtree's centre of mass each motion axis refers to."""
-    return np.array(model.body_rootid[model.dof_bodyid], dtype=np.intp)

@@ -1,0 +1,78 @@
+"""Worst-case time of the controller over many ticks: what the machine, the collector and we add.
+
+Run it alone on a quiet machine: ``python docs/evidence/latency.py --ticks 1000000 [--paced]``.
+"""
+
+import argparse
+import gc
+import json
+import os
+import resource
+import time
+
+import numpy as np
+
+from opspace.bench import SCENES
+
+PERIOD = 1e-3
+
+
+def measure(ticks, *, paced, collector):
+    """Time every tick of the Panda scene, µs; the collector on, frozen or off."""
+    scene = SCENES["panda"]
+    controller = scene.controller()
+    q, v = scene.states(controller.robot)
+    states = list(zip(q, v, strict=True))
+    for k in range(2000):
+        controller.step(0.0, *states[k % len(states)])
+    gc.collect()
+    if collector == "frozen":
+        gc.freeze()
+    elif collector == "off":
+        gc.disable()
+    found = np.zeros(ticks)
+    collections = gc.get_stats()[0]["collections"]
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    due = time.perf_counter()
+    for k in range(ticks):
+        state = states[k % len(states)]
+        if paced:
+            due += PERIOD
+            time.sleep(max(0.0, due - time.perf_counter()))
+        start = time.perf_counter_ns()
+        controller.step(0.0, *state)
+        found[k] = time.perf_counter_ns() - start
+    grown = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before
+    gc.unfreeze()
+    gc.enable()
+    p50, p99, p999 = np.percentile(found * 1e-3, (50, 99, 99.9))
+    return {
+        "ticks": ticks,
+        "paced": paced,
+        "collector": collector,
+        "p50": round(float(p50), 2),
+        "p99": round(float(p99), 2),
+        "p99.9": round(float(p999), 2),
+        "max": round(float(found.max()) * 1e-3, 1),
+        "above_200": int(np.sum(found > 200e3)),
+        "collections": gc.get_stats()[0]["collections"] - collections,
+        "resident_MB": round(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024),
+        "grown_kB": grown,
+    }
+
+
+def main():
+    """Measure with the collector on, frozen and off."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--ticks", type=int, default=1_000_000)
+    parser.add_argument("--paced", action="store_true", help="one tick a millisecond")
+    parser.add_argument("--core", type=int, default=0)
+    options = parser.parse_args()
+    if hasattr(os, "sched_setaffinity"):
+        os.sched_setaffinity(0, {options.core})
+    for collector in ("on", "frozen", "off"):
+        print(json.dumps(measure(options.ticks, paced=options.paced, collector=collector)))
+
+
+if __name__ == "__main__":
+    main()

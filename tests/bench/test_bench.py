@@ -1,0 +1,76 @@
+"""The benchmark measures what it says, keeps it, and compares runs."""
+
+import numpy as np
+import pytest
+
+from opspace.bench import SCENES, Benchmark, compare_runs, run_benchmark
+from opspace.bench.timing import interleaved
+from opspace.errors import InputError, UnknownNameError
+from opspace.plots.benchmark import benchmark_figure
+from opspace.robots import available_robots
+
+INSTALLED = {info.name for info in available_robots() if info.installed}
+
+
+def test_a_scene_is_timed_beside_the_models_own_calls(tmp_path):
+    told = []
+    found = run_benchmark(["puma"], ticks=40, readable=True, announce=told.append)
+    times = found.scenes["puma"]
+    assert told == ["puma"]
+    assert set(times) == {"opspace", "model calls alone", "readable form"}
+    for subject in times.values():
+        assert 0.0 < subject["p50"] <= subject["p99"] <= subject["max"]
+        assert subject["ticks"] == 40
+    assert found.ratio("puma", "opspace", "model calls alone") == (
+        times["opspace"]["p50"] / times["model calls alone"]["p50"]
+    )
+    assert found.ratio("puma", "opspace", "placo") is None
+    found.save(tmp_path / "a" / "bench.json")
+    again = Benchmark.load(tmp_path / "a" / "bench.json")
+    assert again == found
+    heads, rows = compare_runs(found, again)
+    assert len(heads) == 4
+    assert [(row[0], row[3]) for row in rows] == [("puma", "1.00")]
+    assert len(found.table()[1]) == 3
+
+
+@pytest.mark.skipif("panda" not in INSTALLED, reason="needs opspace[robots]")
+@pytest.mark.parametrize("name", ["chain-8", "idv-3"])
+def test_transitions_are_half_way_whenever_they_are_timed(name):
+    scene = SCENES[name]
+    controller = scene.controller()
+    q, v = scene.states(controller.robot)
+    for k in range(3):
+        command = controller.step(scene.time, q[k], v[k])
+        moving = [task for task in command.tasks.values() if 0.0 < task.activation < 1.0]
+        assert len(moving) == scene.transitions
+    assert command.hard_solves == (9 if name == "chain-8" else 8)
+
+
+def test_subjects_take_turns_and_see_the_same_states():
+    seen = {"a": [], "b": []}
+    ticks = {name: (lambda q, v, log=log: log.append(q[0])) for name, log in seen.items()}
+    q = np.arange(5.0)[:, None]
+    times = interleaved(ticks, q, q, 700)
+    assert seen["a"] == seen["b"]
+    assert all(found.shape == (700,) and (found > 0.0).all() for found in times.values())
+
+
+def test_bad_requests_are_refused(tmp_path):
+    with pytest.raises(UnknownNameError, match=r"scene 'pandas'.*panda"):
+        run_benchmark(["pandas"])
+    with pytest.raises(InputError, match="no core 4711"):
+        run_benchmark(["puma"], ticks=1, core=4711)
+    with pytest.raises(InputError, match="at least one tick"):
+        run_benchmark(["puma"], ticks=0)
+    (tmp_path / "x.json").write_text("{}", encoding="utf-8")
+    with pytest.raises(InputError, match=r"x\.json: not a benchmark"):
+        Benchmark.load(tmp_path / "x.json")
+
+
+def test_the_figure_shows_every_scene():
+    times = {"opspace": {"p50": 8.0}, "model calls alone": {"p50": 2.0}}
+    scenes = {"panda": times, "chain-0": times, "chain-4": times, "idv-1": times}
+    left, right = benchmark_figure(scenes).axes
+    assert [label.get_text() for label in left.get_yticklabels()] == ["panda"]
+    assert len(right.lines) == 2
