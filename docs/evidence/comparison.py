@@ -3,7 +3,7 @@
 import re
 from pathlib import Path
 
-from opspace.compare import METHODS, Comparison, compare_scenario
+from opspace.compare import Comparison, compare_scenario
 from opspace.scenario import load_scenario
 from opspace.scenario.progress import ProgressBar
 
@@ -27,7 +27,7 @@ def markdown(comparison: Comparison, keys: tuple[str, ...] | None) -> str:
 def main() -> None:
     """Run every method and rewrite the blocks between the markers."""
     with ProgressBar() as progress:
-        found = compare_scenario(load_scenario(SCENARIO), list(METHODS), OUT, progress=progress)
+        found = compare_scenario(load_scenario(SCENARIO), (), OUT, progress=progress)
     for page, keys in PAGES.items():
         path = ROOT / page
         text = path.read_text(encoding="utf-8")

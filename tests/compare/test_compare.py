@@ -9,7 +9,8 @@ from tests.scenario.short import HOLD, short
 from opspace.cli import main
 from opspace.compare import METHODS, compare_scenario
 from opspace.compare.laws import continuous_inverse, damped_inverse, stack_of_tasks
-from opspace.errors import UnknownNameError
+from opspace.compare.tsid_controller import tsid_installed
+from opspace.errors import InputError, UnknownNameError
 from opspace.law import TaskSet, task_torque
 from opspace.scenario import dump_scenario
 from opspace.scenario.build import build
@@ -66,7 +67,7 @@ def compared():
 
 
 def test_every_method_is_measured(compared):
-    assert list(compared.rows) == list(METHODS)
+    assert list(compared.rows) == [n for n, method in METHODS.items() if method.installed()]
     for name, row in compared.rows.items():
         assert row.torque_step > 0.0, name
         assert row.tick > 0.0
@@ -134,3 +135,19 @@ def test_the_command_writes_table_figure_and_numbers(tmp_path, capsys):
     found = json.loads((out / "compare.json").read_text(encoding="utf-8"))
     assert list(found["methods"]) == ["opspace", "switch"]
     assert (out / "compare.png").stat().st_size > 5000
+
+
+def test_tsid_is_left_out_where_it_is_not_installed(monkeypatch):
+    monkeypatch.setattr("opspace.compare.tsid_controller.tsid_installed", lambda: False)
+    assert "tsid" in METHODS
+    built = build(short(), METHODS["tsid"].controller)
+    with pytest.raises(InputError, match="needs TSID's Python package"):
+        built.controller.step(0.0, built.plant.q, built.plant.v)
+
+
+@pytest.mark.skipif(not tsid_installed(), reason="needs TSID's Python package")
+def test_tsid_asks_for_the_same_accelerations():
+    """Without conflict and with one task in each level a weighted program is nearly a hierarchy."""
+    scenario = short(robot="panda", tasks={"position": HOLD["tasks"]["position"]})
+    found = torques(scenario, "tsid", 3)
+    np.testing.assert_allclose(found[:, 1], found[:, 0], rtol=0, atol=0.5)

@@ -59,6 +59,7 @@ def assert_same_levels(ours, readable):
     assert len(ours.levels) == len(readable.levels)
     for a, b in zip(ours.levels, readable.levels, strict=True):
         assert (a.level, a.tasks, a.directions.shape) == (b.level, b.tasks, b.directions.shape)
+        assert a.scale == pytest.approx(b.scale, abs=1e-9)
         np.testing.assert_allclose(a.sigma, b.sigma, rtol=1e-8, atol=1e-9)
         np.testing.assert_allclose(a.activation, b.activation, rtol=0, atol=1e-7)
         # Vectors are known up to their sign only, and not at all where values coincide.
@@ -169,6 +170,8 @@ OPTIONS = {
     "absolute buffer": {"singularity": Singularity(0.01, 0.5, scale="absolute", profile="cubic")},
     "wide buffer": {"singularity": Singularity(0.5, 30.0, profile="half-sine")},
     "no damping": {"damping": 0.0},
+    "torque limits": {"torque_limits": "priority"},
+    "torque limits, task bias": {"torque_limits": "priority", "bias": "task"},
 }
 
 

@@ -13,6 +13,7 @@ seed: 5
 start: [0, 0.5, -3, 0, 0.7, 0]
 method: switch
 blending: chain
+torque_limits: priority
 bias: task
 tasks:
   reach:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Any
 
 from opspace.compare import controllers as others
+from opspace.compare.tsid_controller import TsidController, tsid_installed
 from opspace.controller import Controller, ReferenceController
 from opspace.scenario import Scenario
 
@@ -22,6 +23,7 @@ class Method:
         controller: Class of the controller.
         changes: What it changes in a scenario.
         profile: Profile of every event; None leaves them as they are.
+        installed: Whether the package that it needs is there.
     """
 
     title: str
@@ -29,6 +31,7 @@ class Method:
     controller: type[ReferenceController] = Controller
     changes: Mapping[str, Any] = field(default_factory=dict[str, Any])
     profile: str | None = None
+    installed: Callable[[], bool] = lambda: True
 
     def scenario(self, scenario: Scenario) -> Scenario:
         """Write down what this method runs in place of a scenario."""
@@ -86,6 +89,12 @@ METHODS: Mapping[str, Method] = MappingProxyType(
         ),
         "as-printed": Method(
             "the paper's Eq. 15-23 to the letter", _NO_BUFFER, others.AsPrintedController
+        ),
+        "tsid": Method(
+            "TSID: one quadratic program, 100 to 1 from level to level, weights ramped",
+            "no joint limits; no sigma buffer",
+            TsidController,
+            installed=tsid_installed,
         ),
     }
 )

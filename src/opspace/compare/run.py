@@ -88,7 +88,7 @@ def compare_scenario(
 
     Args:
         scenario: The scenario.
-        methods: Names of methods; none stands for all.
+        methods: Names of methods; none stands for all that are installed.
         out: Directory for ``compare.json`` and ``compare.png``; None writes nothing.
         progress: Bar that gets a line for each run.
 
@@ -102,7 +102,8 @@ def compare_scenario(
     for name in methods:
         if name not in METHODS:
             raise unknown_name("method", name, METHODS)
-    rows = {name: _run(scenario, name, progress) for name in methods or METHODS}
+    wanted = methods or [name for name, method in METHODS.items() if method.installed()]
+    rows = {name: _run(scenario, name, progress) for name in wanted}
     comparison = Comparison(scenario, rows)
     if out is not None:
         out.mkdir(parents=True, exist_ok=True)

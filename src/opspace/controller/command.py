@@ -19,7 +19,9 @@ class Status(IntFlag):
     JOINT_LIMIT = 2
     """A joint-limit task is partly or fully active."""
     ABOVE_TORQUE_LIMIT = 4
-    """The command is above what the robot's motors give."""
+    """The tasks ask for more than the robot's motors give."""
+    TORQUE_SCALED = 16
+    """Levels, the lowest first, got less torque than they asked for."""
     FAULT = 8
     """No finite torque was found; the command is bias compensation with damping."""
 
@@ -56,6 +58,7 @@ class LevelStatus:
             first; multiples of the tasks' reference values unless the buffer is absolute.
         activation: (k,) activation of each direction.
         directions: (m, k) the directions as columns, in the stacked rows of the tasks.
+        scale: Part of its torque that the level got; below 1 only with ``torque_limits="priority"``.
     """
 
     level: float
@@ -63,6 +66,7 @@ class LevelStatus:
     sigma: np.ndarray
     activation: np.ndarray
     directions: np.ndarray
+    scale: float = 1.0
 
 
 class Report(Protocol):

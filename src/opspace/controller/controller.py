@@ -7,9 +7,10 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
-from opspace.controller.command import Command, Status
+from opspace.controller.command import Command, Found, Status
 from opspace.controller.compiled.layout import (
     DAMPING,
+    KEEP_TORQUE,
     OPTION_SIZE,
     ROOM,
     SIGMA_LOWER,
@@ -31,7 +32,7 @@ from opspace.robots.base import AdapterBase
 from opspace.robots.motion_axes import MotionAxes
 from opspace.stack import Member
 
-STATUSES = tuple(Status(bits) for bits in range(16))
+STATUSES = tuple(Status(bits) for bits in range(32))
 
 
 class Controller(ReferenceController):
@@ -73,7 +74,9 @@ class Controller(ReferenceController):
         plan.refresh(robot, t)
         answer = tick(t, plan.handle)
         if answer < 0:
-            return self._not_done(answer, t, q, v)
+            if answer == STATE_NOT_FINITE:
+                robot.check_state(q, v)
+            return Command(t, self._braking(), Status.FAULT, 0, Found({}, (), {}))
         found = plan.memory.copy()
         return Command(
             t,
@@ -123,13 +126,8 @@ class Controller(ReferenceController):
         option[DAMPING] = self.damping
         option[TASK_BIAS] = float(self.bias == "task")
         option[ROOM] = self._blending.room
+        option[KEEP_TORQUE] = float(self.torque_limits == "priority")
         return option
-
-    def _not_done(self, answer: int, t: float, q: np.ndarray, v: np.ndarray) -> Command:
-        """Say what is wrong with the state, or brake."""
-        if answer == STATE_NOT_FINITE:
-            self.robot.check_state(q, v)  # pyright: ignore[reportAttributeAccessIssue]
-        return super().step(t, q, v)
 
 
 def _vector(value: ArrayLike) -> np.ndarray:

@@ -20,6 +20,7 @@ from opspace.controller.report import level_status, task_status
 from opspace.errors import InputError, unknown_name
 from opspace.law import (
     LawInfo,
+    Motors,
     Profile,
     TaskSet,
     Weighted,
@@ -34,6 +35,10 @@ from opspace.tasks import PostureTask, TaskTerms
 BIASES = ("joint", "task")
 """``joint``: Γ = Γ_tasks + b + g, every joint compensated. ``task``: Eq. 3 as printed, the bias is
 compensated only inside the range of the tasks and fades with them."""
+
+TORQUE_LIMITS = ("report", "priority")
+"""``report``: a torque above the motors' limits is reported and left as it is. ``priority``: levels give
+way until it is inside, the lowest first."""
 
 LIMIT_PASSES = 4
 """How often joint limits are inserted with the accelerations just found; each pass can find the
@@ -58,6 +63,7 @@ class ReferenceController:
         singularity: Buffer for singular directions; None switches their handling off.
         damping: Joint damping in the motions that no task uses, 1/s; also what a joint is braked
             with in case of a fault. Unused where a posture task covers every joint.
+        torque_limits: What happens to a torque above the motors' limits, see `TORQUE_LIMITS`.
 
     Raises:
         InputError: The robot is not fully actuated, or an option cannot be used.
@@ -73,10 +79,13 @@ class ReferenceController:
         bias: str = "joint",
         singularity: Singularity | None = DEFAULT_SINGULARITY,
         damping: float = 10.0,
+        torque_limits: str = "report",
     ) -> None:
         self._blending = Blending(blending)
         if bias not in BIASES:
             raise unknown_name("bias", bias, BIASES)
+        if torque_limits not in TORQUE_LIMITS:
+            raise unknown_name("torque_limits", torque_limits, TORQUE_LIMITS)
         if not (math.isfinite(damping) and damping >= 0.0):
             raise InputError(f"damping must be finite and >= 0 1/s, got {damping}")
         if not isinstance(stack, Stack):
@@ -95,6 +104,8 @@ class ReferenceController:
         self.bias = bias
         self.singularity = singularity
         self.damping = float(damping)
+        self.torque_limits = torque_limits
+        self._motors: Motors | None = None
         self._scales = Scales(robot, singularity)
         stack.attach(self._scales.prepare)
         self.calibration = self._scales.calibration(list(stack))
@@ -132,8 +143,10 @@ class ReferenceController:
         mixed = mixture(members, activations, t, self._blending)
         task_sets, blend = self._task_sets(members, activations, terms, mixed)
         tau, info, limits = self._torque(task_sets, blend)
-        levels = level_status(members, mixed, info, len(limits))
         tau, status = self._checked(tau, limits)
+        if any(level.scale < 1.0 - 1e-12 for level in info.levels):
+            status |= Status.TORQUE_SCALED
+        levels = level_status(members, mixed, info, len(limits))
         if any(np.any(level.activation < 1.0) for level in levels):
             status |= Status.DIRECTION_OFF
         tasks = task_status(members, activations, terms, mixed)
@@ -228,25 +241,45 @@ class ReferenceController:
             corners([task.activation for task in limits], "chain"),
             [Weighted(w, frozenset(first + k for k in present)) for w, present in blend],
         )
+        self._motors = self._limited_motors(L)
         tau, info = self._blend(L, sets, everything)
+        if self._motors is not None:
+            return self._motors.start + tau, info
         return (tau if self.bias == "task" else tau + robot.bias), info
+
+    def _limited_motors(self, L: np.ndarray) -> Motors | None:
+        """What the motors can give beside the bias, or None where they are not asked."""
+        if self.torque_limits != "priority":
+            return None
+        limit = self.robot.torque_limit
+        bias = np.zeros(limit.size) if self.bias == "task" else self.robot.bias
+        return Motors(L, np.clip(bias, -limit, limit), limit)
 
     def _blend(
         self, L: np.ndarray, sets: Sequence[TaskSet], blend: Sequence[Weighted]
     ) -> tuple[np.ndarray, LawInfo]:
         """The sum of hard torques; another law may stand here to be compared with."""
-        return blended_torque(L, sets, blend, self._scales.buffer, want_spectra=True)
+        return blended_torque(
+            L, sets, blend, self._scales.buffer, want_spectra=True, motors=self._motors
+        )
 
     def _acceleration(self, tau: np.ndarray) -> np.ndarray:
         """Joint accelerations that a torque causes, q̈ = A⁻¹ (Γ − b − g) (Eq. 1)."""
         return np.linalg.solve(self.robot.M, tau - self.robot.bias)
+
+    def _braking(self) -> np.ndarray:
+        """Bias with joint damping, inside the motors' limits; finite whatever the model says."""
+        robot = self.robot
+        tau = robot.bias - self.damping * robot.M.diagonal() * robot.v
+        limit = np.minimum(robot.torque_limit, np.finfo(float).max)
+        return np.clip(np.nan_to_num(tau, nan=0.0), -limit, limit)
 
     def _checked(self, tau: np.ndarray, limits: dict[str, float]) -> tuple[np.ndarray, Status]:
         """A torque that is finite, and what there is to say about it."""
         robot = self.robot
         status = Status.OK
         if not np.all(np.isfinite(tau)):
-            tau = robot.bias - self.damping * robot.M.diagonal() * robot.v
+            tau = self._braking()
             status |= Status.FAULT
         if np.any(np.abs(tau) > robot.torque_limit):
             status |= Status.ABOVE_TORQUE_LIMIT

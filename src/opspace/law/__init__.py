@@ -5,6 +5,7 @@ from opspace.law.blending import BLENDINGS, Weighted, combined, corners
 from opspace.law.singularity import SigmaBuffer
 from opspace.law.tasksets import TaskSet
 from opspace.law.torque import COUPLINGS, LawInfo, blended_torque, intermediate_values, task_torque
+from opspace.law.tree import Motors
 
 __all__ = [
     "BLENDINGS",
@@ -13,6 +14,7 @@ __all__ = [
     "Activation",
     "Buffer",
     "LawInfo",
+    "Motors",
     "Profile",
     "Ramp",
     "SigmaBuffer",

@@ -4,7 +4,7 @@
 # pyright: strict, reportConstantRedefinition=false, reportUnknownMemberType=false
 # pyright: reportUnknownVariableType=false, reportUnknownArgumentType=false
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal, overload
 
 import numpy as np
@@ -17,7 +17,7 @@ from opspace.law.hierarchy import hard_law, levels_of, whiten
 from opspace.law.recursion import Recursion, law_recursion
 from opspace.law.singularity import SigmaBuffer
 from opspace.law.tasksets import TaskSet, as_list, check_inertia, check_tasks
-from opspace.law.tree import LevelReport, Walk
+from opspace.law.tree import LevelReport, Motors, Walk
 
 COUPLINGS = ("compensated", "as-printed")
 """``compensated``: lower levels know what higher ones do. ``as-printed``: Eq. 15-23 to the letter."""
@@ -133,6 +133,7 @@ def blended_torque(
     singular: SigmaBuffer | None = None,
     *,
     want_spectra: bool = False,
+    motors: Motors | None = None,
 ) -> tuple[Float[np.ndarray, " n"], LawInfo]:
     """Compute Σ_T w_T H(T; f̃) for corners T that the caller has chosen.
 
@@ -142,13 +143,23 @@ def blended_torque(
         blend: Corners, as indices into ``tasks``, with weights that sum to 1.
         singular: Buffer for singular directions, or None.
         want_spectra: Report the directions of every level.
+        motors: Torque limits to stay inside of, the lowest level giving way first.
 
     Returns:
         Torque Γ, shape (n,), N·m, and what it took.
     """
-    walk = Walk(whiten(tasks, L), levels_of(tasks), buffer=singular, want_spectra=want_spectra)
+    walk = Walk(
+        whiten(tasks, L),
+        levels_of(tasks),
+        buffer=singular,
+        want_spectra=want_spectra,
+        motors=motors,
+    )
     tau = L @ walk.torque(blend, L.shape[0])
-    levels = tuple(walk.report.levels[p] for p in sorted(walk.report.levels))
+    got = {p: min(total / weight, 1.0) for p, (total, weight) in walk.report.got.items()}
+    levels = tuple(
+        replace(walk.report.levels[p], scale=got.get(p, 1.0)) for p in sorted(walk.report.levels)
+    )
     return tau, LawInfo(walk.report.hard_solves, walk.report.level_solves, levels)
 
 

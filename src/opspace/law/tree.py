@@ -5,12 +5,14 @@
 # pyright: reportUnknownVariableType=false, reportUnknownArgumentType=false
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Float
 
 from opspace.law.blending import Weighted
 from opspace.law.hierarchy import Level, Partial, WhitenedTask, solve_level, stack_rows, start
+from opspace.law.saturation import room_for
 from opspace.law.singularity import (
     Alternative,
     LevelOutcome,
@@ -30,12 +32,33 @@ class LevelReport:
         members: Indices of the task sets present, in the order of their rows.
         weight: Weight of the branch that this report describes.
         spectrum: Directions of the level, or None where they were not computed.
+        scale: Part of its torque that the level got, the mean over all branches.
     """
 
     priority: int
     members: tuple[int, ...]
     weight: float
     spectrum: Spectrum | None
+    scale: float = 1.0
+
+
+class Motors(NamedTuple):
+    """What the motors can give.
+
+    Attributes:
+        L: Lower Cholesky factor of the inertia, shape (n, n).
+        start: Torque before the first level, inside the limits, shape (n,), N·m.
+        limit: Largest torque of each joint, shape (n,), N·m; inf where there is none.
+    """
+
+    L: Float[np.ndarray, "n n"]
+    start: Float[np.ndarray, " n"]
+    limit: Float[np.ndarray, " n"]
+
+    def scale(self, above: Float[np.ndarray, " n"], below: Float[np.ndarray, " n"]) -> float:
+        """Part of the step from û ``above`` to ``below`` that they can give, see `room_for`."""
+        part = self.L @ (below - above)
+        return room_for(part, self.start + self.L @ above, self.limit)
 
 
 @dataclass
@@ -47,11 +70,13 @@ class WalkReport:
         level_solves: Levels that were actually solved; corners share the levels above their first
             difference.
         levels: One report per level that was reached.
+        got: Per priority the sums of weight times scale, and of weight.
     """
 
     hard_solves: int = 0
     level_solves: int = 0
     levels: dict[int, LevelReport] = field(default_factory=dict[int, LevelReport])
+    got: dict[int, tuple[float, float]] = field(default_factory=dict[int, tuple[float, float]])
 
 
 class Walk:
@@ -63,6 +88,7 @@ class Walk:
         buffer: Buffer on σ for the singular directions, or None for the plain law.
         compensate: False for Eq. 15-16 to the letter.
         want_spectra: Compute every level's spectrum for the report, needed or not.
+        motors: Scale levels, the lowest first, so that every branch stays inside the torque limits.
     """
 
     def __init__(
@@ -73,12 +99,14 @@ class Walk:
         buffer: SigmaBuffer | None = None,
         compensate: bool = True,
         want_spectra: bool = False,
+        motors: Motors | None = None,
     ) -> None:
         self._whitened = whitened
         self._levels = levels
         self._buffer = buffer
         self._compensate = compensate
         self._want_spectra = want_spectra
+        self._motors = motors
         self.report = WalkReport()
 
     def torque(self, blend: Sequence[Weighted], n: int) -> Float[np.ndarray, " n"]:
@@ -99,10 +127,25 @@ class Walk:
         for members, corners in groups.items():
             share = weight * sum(corner.weight for corner in corners)
             for alternative in self._solve(level, members, above, share):
+                weight_here = weight * alternative.weight
+                partial = alternative.partial
+                if members and self._motors is not None:
+                    partial = self._inside(
+                        level, above, partial, share * alternative.weight, self._motors
+                    )
                 total += alternative.weight * self._descend(
-                    depth + 1, alternative.partial, weight * alternative.weight, corners
+                    depth + 1, partial, weight_here, corners
                 )
         return total
+
+    def _inside(
+        self, level: Level, above: Partial, partial: Partial, share: float, motors: Motors
+    ) -> Partial:
+        """Scale what a level adds, so that the motors can give it."""
+        scale = motors.scale(above.u, partial.u)
+        total, weight = self.report.got.get(level.priority, (0.0, 0.0))
+        self.report.got[level.priority] = total + share * scale, weight + share
+        return Partial(above.u + scale * (partial.u - above.u), partial.Z)
 
     def _solve(
         self, level: Level, members: frozenset[int], above: Partial, share: float

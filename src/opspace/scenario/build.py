@@ -69,6 +69,7 @@ def build(scenario: Scenario, controller: type[ReferenceController] = Controller
             robot,
             stack,
             blending=scenario.blending,
+            torque_limits=scenario.torque_limits,
             bias=scenario.bias,
             singularity=_singularity(scenario),
         )

@@ -127,6 +127,11 @@ class Scenario(Entry):
         description="events, joint limits and singular directions fade or switch; with none events "
         "switch and the others are not handled at all",
     )
+    torque_limits: Literal["report", "priority"] = Field(
+        default="report",
+        description="what happens above the motors' limits: report it, or let levels give way, "
+        "the lowest first",
+    )
     blending: Literal["auto", "idv", "chain"] = Field(
         default="auto",
         description="blend of simultaneous transitions: idv for 3 and the chain beyond, "

@@ -70,8 +70,9 @@ VARIABLE_SIZE = 9
     LIMIT_KP,
     LIMIT_RETURN_SPEED,
     LIMIT_BUFFER,
-) = range(15)
-OPTION_SIZE = 15
+    KEEP_TORQUE,
+) = range(16)
+OPTION_SIZE = 16
 
 # What a tick answers when there is no torque, and what a hard torque counts in its answer.
 STATE_NOT_FINITE, NOT_FINITE, NOT_POSITIVE_DEFINITE = -1, -2, -3
@@ -96,8 +97,9 @@ class Tick(NamedTuple):
     margin) of joint limits; ``torque_limit``; ``option``.
 
     What it writes, all in one block of memory: ``tau``, ``h`` of each task, ``share`` of each slot,
-    ``error`` and ``wanted`` of each row, ``limit_h``, ``limit_wanted``, and for the
-    report of the levels ``Jw`` (rows, n), whitened, and the memory of the walk.
+    ``error`` and ``wanted`` of each row, ``limit_h``, ``limit_wanted``, ``scale`` of each level (joint
+    limits first, what damps the rest last), and for the report of the levels ``Jw`` (rows, n),
+    whitened, and the memory of the walk.
 
     The rest is scratch.
     """
@@ -138,6 +140,7 @@ class Tick(NamedTuple):
     wanted: np.ndarray
     limit_h: np.ndarray
     limit_wanted: np.ndarray
+    scale: np.ndarray
     Jw: np.ndarray
     J: np.ndarray
     drift: np.ndarray
@@ -210,6 +213,7 @@ def tick_handle(t, space):
         t.wanted,
         t.limit_h,
         t.limit_wanted,
+        t.scale,
         t.Jw,
         t.J,
         t.drift,

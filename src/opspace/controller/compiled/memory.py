@@ -68,6 +68,7 @@ def reported(size: Sizes, block: Block) -> dict[str, np.ndarray]:
         "share": block.take(size.slots),
         "error": block.take(size.rows),
         "limit_h": block.take(size.limits),
+        "scale": block.take(size.levels + 2),
         "top": block.take(size.levels + 2),
         "chosen": block.take_integers(size.levels + 2),
         "width": block.take_integers(size.levels + 2),
@@ -87,7 +88,7 @@ def reported_size(size: Sizes) -> int:
         + size.rows
         + size.limits
         + 2
-        + 3 * depth
+        + 4 * depth
         + rows * n
         + (depth * n * n)
     )
@@ -109,11 +110,15 @@ def make_tick(
     """
     block = Block(reported_size(size))
     kept = reported(size, block)
+    L = np.zeros((size.n, size.n))
+    limit = np.array(torque_limit)  # one that may be written, like all the others
     space = make_space(size.n, size.levels + 1, size.rows + size.limits)._replace(
         top=kept.pop("top"),
         chosen=kept.pop("chosen"),
         width=kept.pop("width"),
         basis=kept.pop("basis"),
+        factor=L,
+        limit=limit,
     )
     integers = np.int64
     tick = Tick(
@@ -144,7 +149,8 @@ def make_tick(
         own=np.ones(size.tasks),
         limit_joint=np.zeros(size.limits, integers),
         limit=np.zeros((size.limits, 5)),
-        torque_limit=np.array(torque_limit),  # one that may be written, like all the others
+        torque_limit=limit,
+        L=L,
         option=option,
         **kept,
         **_scratch(size),
@@ -162,7 +168,6 @@ def _scratch(size: Sizes) -> dict[str, np.ndarray]:
         "J": np.zeros((rows, n)),
         "drift": np.zeros(rows),
         "fw": np.zeros(rows + limits),
-        "L": np.zeros((n, n)),
         "velocity": np.zeros((n, 6)),
         "acceleration": np.zeros((n, 6)),
         "motion": np.zeros((3, 24)),

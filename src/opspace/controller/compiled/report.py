@@ -92,6 +92,7 @@ class CompiledReport:
     def _level(self, found: dict[str, np.ndarray], rank: int, level: float) -> LevelStatus:
         plan = self._plan
         depth = rank + 1
+        scale = float(found["scale"][depth])
         here = [s for s, place in enumerate(plan.places) if place[0] == level]
         if found["top"][depth] <= 0.0:
             shown = [s for s in here if found["share"][s] > 0.0]
@@ -99,7 +100,7 @@ class CompiledReport:
             rows = sum(member.task.rows for member in members)
             empty = np.zeros(0)
             names = tuple(member.task.name for member in members)
-            return LevelStatus(level, names, empty, empty, np.zeros((rows, 0)))
+            return LevelStatus(level, names, empty, empty, np.zeros((rows, 0)), scale)
         chosen = int(found["chosen"][depth])
         present = [s for s in here if chosen & slot_bit.py_func(s)]
         packed = [plan.packed[plan.places[s][1]] for s in present]
@@ -109,7 +110,7 @@ class CompiledReport:
             found["Jw"], rows, found["basis"][depth], free, plan.tick.option
         )
         names = tuple(p.task.name for p in packed)
-        return LevelStatus(level, names, sigma, activation, directions)
+        return LevelStatus(level, names, sigma, activation, directions, scale)
 
 
 @jit

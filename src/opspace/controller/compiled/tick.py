@@ -11,6 +11,7 @@ from opspace.controller.compiled.layout import (
     DAMPING,
     FIRST_ROW,
     JOINTS,
+    KEEP_TORQUE,
     KIND,
     LIMIT_WEIGHT,
     NOT_FINITE,
@@ -29,13 +30,14 @@ from opspace.law.compiled.corners import corners, insert, sort_corners
 from opspace.law.compiled.jit import jit
 from opspace.law.compiled.level import solve_level, take_alternative
 from opspace.law.compiled.profiles import ramp
-from opspace.law.compiled.walk import begin, pass_on, slot_bit, walk
+from opspace.law.compiled.walk import begin, keep_inside, pass_on, slot_bit, walk
 
 LIMIT_PASSES = 4
 NO_GROUP, EXACT, CHAINED = range(3)
 FADED = int(Status.DIRECTION_OFF)
 LIMITED = int(Status.JOINT_LIMIT)
 ABOVE = int(Status.ABOVE_TORQUE_LIMIT)
+SCALED = int(Status.TORQUE_SCALED)
 
 
 @jit
@@ -71,7 +73,9 @@ def tick(t, k):
             law(k, stacks, limit_stacks)
             solves = stacks * limit_stacks
     torque(k)
-    return status(k) + SOLVE * solves if _finite(k.tau) else NOT_FINITE
+    if not _finite(k.tau):
+        return NOT_FINITE
+    return status(k) + SOLVE * solves
 
 
 @jit
@@ -202,6 +206,8 @@ def law(k, stacks, limit_stacks):
     n = k.v.shape[0]
     s = k.space
     levels = s.u.shape[0] - 1
+    if k.option[KEEP_TORQUE] != 0.0:
+        start_inside(k, n)
     for a in range(n):
         k.u[a] = 0.0
     begin(n, levels, s)
@@ -240,6 +246,8 @@ def _under_limits(k, c, stacks, levels):
         _walk(k, stacks, levels)
         return
     alternatives = solve_level(0, count, n, k.Jw, k.fw, False, k.option, s)
+    if alternatives == 1:
+        keep_inside(0, n, k.limit_weight[c], s)
     for i in range(alternatives):
         share = 1.0
         if alternatives > 1:
@@ -247,6 +255,7 @@ def _under_limits(k, c, stacks, levels):
             if share <= 0.0:
                 continue
             take_alternative(0, i, n, s)
+            keep_inside(0, n, k.limit_weight[c] * share, s)
         s.path[1] = k.limit_weight[c] * share
         _walk(k, stacks, levels)
 
@@ -314,9 +323,20 @@ def torque(k):
         total = 0.0
         for b in range(a + 1):
             total += k.L[a, b] * k.u[b]
-        if k.option[TASK_BIAS] == 0.0:
+        if k.option[KEEP_TORQUE] != 0.0:
+            total += k.space.start[a]
+        elif k.option[TASK_BIAS] == 0.0:
             total += k.bias[a]
         k.tau[a] = total
+
+
+@jit
+def start_inside(k, n):
+    """Begin with the bias where it is compensated at every joint, cut at the limits."""
+    k.space.motors[0] = 1
+    for a in range(n):
+        bias = k.bias[a] if k.option[TASK_BIAS] == 0.0 else 0.0
+        k.space.start[a] = min(max(bias, -k.torque_limit[a]), k.torque_limit[a])
 
 
 @jit
@@ -333,4 +353,10 @@ def status(k):
     for a in range(k.tau.shape[0]):
         if abs(k.tau[a]) > k.torque_limit[a]:
             bits |= ABOVE
+    for d in range(k.scale.shape[0]):
+        k.scale[d] = 1.0
+        if k.option[KEEP_TORQUE] != 0.0 and k.space.got[d, 1] > 0.0:
+            k.scale[d] = min(k.space.got[d, 0] / k.space.got[d, 1], 1.0)
+            if k.scale[d] < 1.0 - 1e-12:
+                bits |= SCALED
     return bits

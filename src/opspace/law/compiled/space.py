@@ -43,8 +43,13 @@ class Space(NamedTuple):
         scale: (n,) scratch.
         sigma: (n,) singular values.
         basis: (D + 1, n, n) Z above each level when ``top`` was found.
-        contribution: (D + 1, n) what each level adds to the torque, whitened; the last is what
-            damps the rest.
+        motors: (1,) whether torque limits are kept.
+        factor: (n, n) Cholesky factor of the inertia.
+        start: (n,) torque before the first level, inside the limits, N·m.
+        limit: (n,) largest torque of each joint, N·m.
+        torque: (D + 1, n) torque so far, N·m.
+        part: (n,) scratch.
+        got: (D + 1, 2) sums of weight times scale, and of weight, of each level.
     """
 
     Z: np.ndarray
@@ -73,7 +78,13 @@ class Space(NamedTuple):
     scale: np.ndarray
     sigma: np.ndarray
     basis: np.ndarray
-    contribution: np.ndarray
+    motors: np.ndarray
+    factor: np.ndarray
+    start: np.ndarray
+    limit: np.ndarray
+    torque: np.ndarray
+    part: np.ndarray
+    got: np.ndarray
 
 
 def make_space(n: int, depth: int, rows: int) -> Space:
@@ -107,7 +118,13 @@ def make_space(n: int, depth: int, rows: int) -> Space:
         scale=np.zeros(most),
         sigma=np.zeros(n),
         basis=np.zeros((D, n, n)),
-        contribution=np.zeros((D, n)),
+        motors=np.zeros(1, integers),
+        factor=np.zeros((n, n)),
+        start=np.zeros(n),
+        limit=np.full(n, np.inf),
+        torque=np.zeros((D, n)),
+        part=np.zeros(n),
+        got=np.zeros((D, 2)),
     )
 
 
@@ -149,5 +166,11 @@ def space_handle(s):
         s.scale,
         s.sigma,
         s.basis,
-        s.contribution,
+        s.motors,
+        s.factor,
+        s.start,
+        s.limit,
+        s.torque,
+        s.part,
+        s.got,
     )

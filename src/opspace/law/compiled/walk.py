@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from opspace.law.compiled.jit import jit
 from opspace.law.compiled.level import solve_level, take_alternative
+from opspace.law.compiled.saturation import room_for
 
 # Columns of ``Space.cursor``.
 FIRST, END, NEXT, GROUP, GROUP_END, ALTERNATIVE = range(6)
@@ -12,7 +13,7 @@ FIRST, END, NEXT, GROUP, GROUP_END, ALTERNATIVE = range(6)
 @jit
 def begin(n, levels, s):
     """Nothing decided, everything free, and nothing known about any level."""
-    u, Z, top, contribution = s.u, s.Z, s.top, s.contribution
+    u, Z, top, got = s.u, s.Z, s.top, s.got
     for a in range(n):
         u[0, a] = 0.0
         for b in range(n):
@@ -22,8 +23,10 @@ def begin(n, levels, s):
     s.path[0] = 1.0
     for d in range(levels + 1):
         top[d] = 0.0
+        got[d, 0], got[d, 1] = 0.0, 0.0
+    if s.motors[0] != 0:
         for a in range(n):
-            contribution[d, a] = 0.0
+            s.torque[0, a] = s.start[a]
 
 
 @jit
@@ -50,7 +53,7 @@ def walk(first, levels, n, slots, J, f, masks, weights, corners, rest, buffer, s
     d = first
     while d >= first:
         if d == levels or free[d] == 0:
-            _leaf(first, d, n, levels, weights, rest, s, u)
+            _leaf(d, n, weights, rest, s, u)
             d -= 1
         elif cursor[d, ALTERNATIVE] < alternatives[d]:
             i = cursor[d, ALTERNATIVE]
@@ -61,6 +64,7 @@ def walk(first, levels, n, slots, J, f, masks, weights, corners, rest, buffer, s
                 if share <= 0.0:
                     continue
                 take_alternative(d, i, n, s)
+                keep_inside(d, n, path[d] * share * group_weight(d, weights, cursor), s)
             path[d + 1] = path[d] * share
             _enter(d + 1, cursor[d, GROUP], cursor[d, GROUP_END], cursor, alternatives)
             d += 1
@@ -84,30 +88,34 @@ def _enter(d, first, end, cursor, alternatives):
 
 
 @jit
-def _leaf(first, d, n, levels, weights, rest, s, u):
-    U, Z, contribution = s.u, s.Z, s.contribution
+def _leaf(d, n, weights, rest, s, u):
+    U, Z = s.u, s.Z
     share = 0.0
     for c in range(s.cursor[d, FIRST], s.cursor[d, END]):
         share += weights[c]
     share *= s.path[d]
     for a in range(n):
         u[a] += share * U[d, a]
-        for k in range(first, d):
-            contribution[k, a] += share * (U[k + 1, a] - U[k, a])
-    if first > 0:
-        # The levels above ``first`` were decided by someone else.
-        for a in range(n):
-            contribution[0, a] += share * (U[first, a] - U[0, a])
     if rest[n] == 0.0:
         return
+    x = s.x
+    for a in range(n):
+        x[a] = 0.0
     for k in range(s.free[d]):
         along = 0.0
         for a in range(n):
             along += Z[d, k, a] * rest[a]
-        along *= share
         for a in range(n):
-            u[a] += along * Z[d, k, a]
-            contribution[levels, a] += along * Z[d, k, a]
+            x[a] += along * Z[d, k, a]
+    if s.motors[0] != 0:
+        torque_of(x, n, s)
+        scale = room_for(s.part, s.torque[d], s.limit)
+        last = s.got.shape[0] - 1
+        s.got[last, 0] += share * scale
+        s.got[last, 1] += share
+        share *= scale
+    for a in range(n):
+        u[a] += share * x[a]
 
 
 @jit
@@ -141,6 +149,8 @@ def _next_group(d, levels, n, slots, J, f, masks, weights, rest, buffer, s):
     last = d + 1 == levels and rest[n] == 0.0
     found = solve_level(d, count, n, J, f, last, buffer, s)
     s.alternatives[d] = found
+    if found == 1:
+        keep_inside(d, n, share, s)
     if share > s.top[d]:
         _remember(d, n, share, present, s)
         s.off[d] = 1 if found > 1 and s.faded[0] != 0 else 0
@@ -157,6 +167,47 @@ def pass_on(d, n, s):
     for k in range(r):
         for a in range(n):
             Z[d + 1, k, a] = Z[d, k, a]
+    if s.motors[0] != 0:
+        for a in range(n):
+            s.torque[d + 1, a] = s.torque[d, a]
+
+
+@jit
+def group_weight(d, weights, cursor):
+    """Weight of the corners that the present group of a node stands for."""
+    total = 0.0
+    for c in range(cursor[d, GROUP], cursor[d, GROUP_END]):
+        total += weights[c]
+    return total
+
+
+@jit
+def torque_of(x, n, s):
+    """Torque L x of a whitened one, into ``s.part``."""
+    L, part = s.factor, s.part
+    for a in range(n):
+        total = 0.0
+        for b in range(a + 1):
+            total += L[a, b] * x[b]
+        part[a] = total
+
+
+@jit
+def keep_inside(d, n, weight, s):
+    """Scale what the level at depth ``d`` has just added, so that the motors can give it."""
+    if s.motors[0] == 0:
+        return
+    u, torque, part, x = s.u, s.torque, s.part, s.x
+    for a in range(n):
+        x[a] = u[d + 1, a] - u[d, a]
+    torque_of(x, n, s)
+    scale = room_for(part, torque[d], s.limit)
+    s.got[d, 0] += weight * scale
+    s.got[d, 1] += weight
+    for a in range(n):
+        torque[d + 1, a] = torque[d, a] + scale * part[a]
+        if scale < 1.0:
+            u[d + 1, a] = u[d, a] + scale * x[a]
 
 
 @jit
