@@ -301,6 +301,26 @@ def check(
         print(f"warning: {warning}")
 
 
+@app.command(epilog="Example: opspace replay results/showpiece")
+def replay(
+    recording: Annotated[
+        Path, typer.Argument(help="Directory of a recording of opspace run.", metavar="RUN")
+    ],
+) -> None:
+    """Put the recorded states to a fresh controller and compare the torques."""
+    from opspace.scenario.replay import replay
+
+    found = replay(recording)
+    print(f"{found.ticks} ticks; how the recorded run ended: {found.ended}")
+    print(f"largest difference of a torque: {found.gap:.3g} N·m at t = {found.gap_at:.3f} s")
+    if found.seconds:
+        rows = [
+            (name, f"{seconds:.3f}", f"{found.first[name]:.3f}")
+            for name, seconds in found.seconds.items()
+        ]
+        _print_table(("status", "held for [s]", "first at [s]"), rows)
+
+
 @app.command(epilog="Example: opspace plot results/singularity/transition tau tool/x")
 def plot(
     recording: Annotated[Path, typer.Argument(help="Directory of a recording.", metavar="RUN")],

@@ -22,6 +22,12 @@ class Status(IntFlag):
     """The tasks ask for more than the robot's motors give."""
     TORQUE_SCALED = 16
     """Levels, the lowest first, got less torque than they asked for."""
+    LATE = 32
+    """A tick was missed: more than one and a half periods have passed."""
+    TIME_JUMP = 64
+    """Time stood still, ran backwards, or jumped by more than ten periods."""
+    STALE = 128
+    """The state is that of the tick before to the last bit, although the robot moves."""
     FAULT = 8
     """No finite torque was found; the command is bias compensation with damping."""
 

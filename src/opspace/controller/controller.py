@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
-from opspace.controller.command import Command, Found, Status
+from opspace.controller.command import Command, Status
 from opspace.controller.compiled.layout import (
     DAMPING,
     KEEP_TORQUE,
@@ -32,7 +32,7 @@ from opspace.robots.base import AdapterBase
 from opspace.robots.motion_axes import MotionAxes
 from opspace.stack import Member
 
-STATUSES = tuple(Status(bits) for bits in range(32))
+STATUSES = tuple(Status(bits) for bits in range(256))
 
 
 class Controller(ReferenceController):
@@ -65,6 +65,12 @@ class Controller(ReferenceController):
         if q.shape != axes.q.shape or v.shape != axes.v.shape:
             robot.check_state(q, v)
         robot.place(q, v)
+        timing = Status.OK
+        if self._timing is not None:
+            robot.check_state(q, v)
+            timing = self._timing.check(t, q, v)
+            if timing & Status.TIME_JUMP and self._holds:
+                return self._hold(t, timing)
         members = self.stack.begin_tick(t)
         plan = self._plan
         if plan is None or members is not plan.members:
@@ -76,12 +82,12 @@ class Controller(ReferenceController):
         if answer < 0:
             if answer == STATE_NOT_FINITE:
                 robot.check_state(q, v)
-            return Command(t, self._braking(), Status.FAULT, 0, Found({}, (), {}))
+            return self._hold(t, timing | Status.FAULT)
         found = plan.memory.copy()
         return Command(
             t,
             found[: plan.n],
-            STATUSES[answer % SOLVE],
+            STATUSES[answer % SOLVE | timing],
             answer // SOLVE,
             CompiledReport(plan, found),
         )

@@ -17,6 +17,7 @@ from opspace.controller.joint_limits import (
 )
 from opspace.controller.options import DEFAULT_SINGULARITY, Scales, Singularity, check_drivable
 from opspace.controller.report import level_status, task_status
+from opspace.controller.timing import Timing
 from opspace.errors import InputError, unknown_name
 from opspace.law import (
     LawInfo,
@@ -64,6 +65,10 @@ class ReferenceController:
         damping: Joint damping in the motions that no task uses, 1/s; also what a joint is braked
             with in case of a fault. Unused where a posture task covers every joint.
         torque_limits: What happens to a torque above the motors' limits, see `TORQUE_LIMITS`.
+        period: Time between two ticks, s, if ticks and states shall be watched: late, jumping and stale
+            ones are then reported in the status. None watches nothing.
+        on_time_jump: What happens when time runs backwards or jumps, see
+            `opspace.controller.timing.POLICIES`; it needs ``period``.
 
     Raises:
         InputError: The robot is not fully actuated, or an option cannot be used.
@@ -80,6 +85,8 @@ class ReferenceController:
         singularity: Singularity | None = DEFAULT_SINGULARITY,
         damping: float = 10.0,
         torque_limits: str = "report",
+        period: float | None = None,
+        on_time_jump: str = "report",
     ) -> None:
         self._blending = Blending(blending)
         if bias not in BIASES:
@@ -105,6 +112,9 @@ class ReferenceController:
         self.singularity = singularity
         self.damping = float(damping)
         self.torque_limits = torque_limits
+        if period is None and on_time_jump != "report":
+            raise InputError(f"on_time_jump={on_time_jump!r} needs the period of the ticks")
+        self._timing = None if period is None else Timing(period, on_time_jump)
         self._motors: Motors | None = None
         self._scales = Scales(robot, singularity)
         stack.attach(self._scales.prepare)
@@ -137,6 +147,9 @@ class ReferenceController:
             raise InputError(f"time must be finite, got {t}")
         robot = self.robot
         robot.update(np.asarray(q, dtype=float), np.asarray(v, dtype=float))
+        timing = Status.OK if self._timing is None else self._timing.check(t, robot.q, robot.v)
+        if timing & Status.TIME_JUMP and self._holds:
+            return self._hold(t, timing)
         members = self.stack.begin_tick(t)
         activations = [self._activation(member, t) for member in members]
         terms = [member.task.evaluate(robot, t) for member in members]
@@ -144,6 +157,7 @@ class ReferenceController:
         task_sets, blend = self._task_sets(members, activations, terms, mixed)
         tau, info, limits = self._torque(task_sets, blend)
         tau, status = self._checked(tau, limits)
+        status |= timing
         if any(level.scale < 1.0 - 1e-12 for level in info.levels):
             status |= Status.TORQUE_SCALED
         levels = level_status(members, mixed, info, len(limits))
@@ -266,6 +280,14 @@ class ReferenceController:
     def _acceleration(self, tau: np.ndarray) -> np.ndarray:
         """Joint accelerations that a torque causes, q̈ = A⁻¹ (Γ − b − g) (Eq. 1)."""
         return np.linalg.solve(self.robot.M, tau - self.robot.bias)
+
+    @property
+    def _holds(self) -> bool:
+        return self._timing is not None and self._timing.policy == "hold"
+
+    def _hold(self, t: float, status: Status) -> Command:
+        """Brake in a tick that cannot be trusted."""
+        return Command(t, self._braking(), status, 0, Found({}, (), {}))
 
     def _braking(self) -> np.ndarray:
         """Bias with joint damping, inside the motors' limits; finite whatever the model says."""
