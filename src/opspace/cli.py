@@ -321,6 +321,30 @@ def replay(
         _print_table(("status", "held for [s]", "first at [s]"), rows)
 
 
+@app.command(epilog="Example: opspace film results/showpiece --speed 2 --out showpiece.gif")
+def film(
+    recording: Annotated[
+        Path, typer.Argument(help="Directory of a recording of opspace run.", metavar="RUN")
+    ],
+    speed: Annotated[float, typer.Option(help="Seconds of the run per second of film.")] = 1.0,
+    fps: Annotated[float, typer.Option(help="Pictures per second.")] = 10.0,
+    out: Annotated[
+        Path | None, typer.Option(help="File to write (.gif). [default: RUN/film.gif]")
+    ] = None,
+) -> None:
+    """Draw a run as an animated GIF."""
+    from opspace.record import load
+    from opspace.scenario import load_scenario
+    from opspace.scenario.build import build_robot
+    from opspace.scenario.run import SCENARIO
+    from opspace.sim.film import film
+
+    path = out or recording / "film.gif"
+    robot = build_robot(load_scenario(recording / SCENARIO))
+    film(load(recording), robot, path, fps=fps, speed=speed)
+    print(f"results: {path}")
+
+
 @app.command(epilog="Example: opspace plot results/singularity/transition tau tool/x")
 def plot(
     recording: Annotated[Path, typer.Argument(help="Directory of a recording.", metavar="RUN")],

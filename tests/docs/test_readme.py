@@ -91,7 +91,7 @@ def test_every_picture_is_shown_and_small():
         (page.parent / target).resolve()
         for page in PAGES
         for target in targets_of(page)
-        if target.endswith(".png")
+        if target.endswith((".png", ".gif"))
     }
     pictures = set((ROOT / "docs" / "images").resolve().glob("*"))
     assert pictures == shown
