@@ -42,10 +42,10 @@ def test_a_film_has_a_picture_for_every_moment(run, tmp_path):
         assert moving.size == (SIZE[0] + BAND, SIZE[1])
         assert moving.info["duration"] == 250
         first = np.asarray(moving.convert("RGB")).astype(int)
-        moving.seek(moving.n_frames - 1)
-        last = np.asarray(moving.convert("RGB")).astype(int)
-    assert np.abs(first[:, BAND:] - last[:, BAND:]).mean() > 1.0
-    assert np.abs(first[:20, :BAND] - last[:20, :BAND]).max() > 50  # the time
+        moving.seek(moving.n_frames // 2)
+        middle = np.asarray(moving.convert("RGB")).astype(int)
+    assert np.abs(first[:, BAND:] - middle[:, BAND:]).mean() > 1.0
+    assert np.abs(first[:20, :BAND] - middle[:20, :BAND]).max() > 50  # the time
 
 
 @pytest.mark.parametrize(
