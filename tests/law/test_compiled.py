@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from opspace.law import SigmaBuffer, TaskSet, blended_torque, corners
 from opspace.law.activation import PROFILES, Profile, Ramp
-from opspace.law.compiled.algebra import exceeds, singular_values
+from opspace.law.compiled.algebra import cholesky, singular_values
 from opspace.law.compiled.corners import sort_corners
 from opspace.law.compiled.profiles import PROFILE_CODE, profile, ramp
 from opspace.law.compiled.space import make_space, space_handle
@@ -125,4 +125,4 @@ def test_the_certificate_is_exact(seed, m, shift):
     smallest = np.linalg.eigvalsh(B @ B.T)[0]
     bound = smallest * (1.0 + shift)
     if abs(shift) > 1e-6:
-        assert exceeds(B @ B.T, m, bound, np.zeros((m, m))) == (bound < smallest)
+        assert cholesky(B @ B.T, m, bound, np.zeros((m, m))) == (bound < smallest)

@@ -42,8 +42,8 @@ class Controller(ReferenceController):
     arguments, errors and results are the same. The first controller on a machine compiles it, which
     takes half a minute; later ones read it from the disk.
 
-    Robots with joints of several coordinates, and stacks of more than some thirty tasks, take the
-    readable form.
+    Options are fixed when it is built. Robots with joints of several coordinates, and stacks of more
+    than some thirty tasks, take the readable form.
     """
 
     _axes: MotionAxes | None = None

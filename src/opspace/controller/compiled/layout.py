@@ -90,7 +90,7 @@ class Tick(NamedTuple):
     of each row ``coordinate`` (joint tasks), ``select`` (rows, 6), ``goal`` (rows, 3: position,
     velocity, acceleration of joint tasks), ``kp``, ``kv``, ``row_weight`` = 1/√reference;
     ``variable`` and ``group`` of each activation that moves or rests, the tasks' presences first;
-    ``slots`` (slots, 3: depth, first row, rows) in the order of the levels, ``slot_task``,
+    ``slots`` (slots, 3: depth, first row, rows) in the order of the levels,
     ``slot_on`` and ``slot_off``: variables that must be on or off for a task to be there,
     ``slot_place``: those of them that choose its place; ``own``: activation of each task by its
     own function; ``limit_joint`` and ``limit`` (limits, 4: side, position, braking acceleration,
@@ -124,7 +124,6 @@ class Tick(NamedTuple):
     variable: np.ndarray
     group: np.ndarray
     slots: np.ndarray
-    slot_task: np.ndarray
     slot_on: np.ndarray
     slot_off: np.ndarray
     slot_place: np.ndarray
@@ -197,7 +196,6 @@ def tick_handle(t, space):
         t.variable,
         t.group,
         t.slots,
-        t.slot_task,
         t.slot_on,
         t.slot_off,
         t.slot_place,

@@ -142,7 +142,6 @@ def make_tick(
         variable=np.zeros((size.variables, VARIABLE_SIZE)),
         group=np.zeros(size.variables, integers),
         slots=np.zeros((size.slots, 3), integers),
-        slot_task=np.zeros(size.slots, integers),
         slot_on=np.zeros(size.slots, integers),
         slot_off=np.zeros(size.slots, integers),
         slot_place=np.zeros(size.slots, integers),

@@ -149,7 +149,6 @@ class Plan:
             chosen = 0 if place.arrival is None else 1 << index[id(place.arrival)]
             later = [p.arrival for p in member.places[k + 1 :]]
             tick.slots[s] = rank[level] + 1, packed.rows.start, member.task.rows
-            tick.slot_task[s] = i
             tick.slot_place[s] = chosen
             tick.slot_on[s] = chosen | 1 << i
             tick.slot_off[s] = sum({1 << index[id(arrival)] for arrival in later})

@@ -57,7 +57,7 @@ def tick(t, k):
     activations(t, k)
     evaluate_tasks(k)
     n = k.v.shape[0]
-    if not cholesky(k.M, n, k.L):
+    if not cholesky(k.M, n, 0.0, k.L):
         return NOT_POSITIVE_DEFINITE
     stacks = blend(k)
     whiten(k)

@@ -13,15 +13,18 @@ EPSILON = 2e-15
 
 
 @jit
-def cholesky(A, n, L):
-    """Factor A = L Lᵀ into the lower triangle of L.
+def cholesky(A, n, shift, L):
+    """Factor A − shift·I = L Lᵀ into the lower triangle of L.
 
     Returns:
-        Whether A is positive definite; otherwise L is not usable.
+        Whether it is positive definite, that is whether every eigenvalue of A is above the shift;
+        otherwise L is not usable.
     """
     for i in range(n):
         for j in range(i + 1):
             s = A[i, j]
+            if i == j:
+                s -= shift
             for k in range(j):
                 s -= L[i, k] * L[j, k]
             if i == j:
@@ -30,28 +33,6 @@ def cholesky(A, n, L):
                 L[i, i] = math.sqrt(s)
             else:
                 L[i, j] = s / L[j, j]
-    return True
-
-
-@jit
-def exceeds(G, m, bound, work):
-    """Tell whether every eigenvalue of the symmetric G (m, m) is above a bound.
-
-    G − bound·I is positive definite exactly then, which its Cholesky factorisation decides.
-    """
-    for i in range(m):
-        for j in range(i + 1):
-            s = G[i, j]
-            if i == j:
-                s -= bound
-            for k in range(j):
-                s -= work[i, k] * work[j, k]
-            if i == j:
-                if not s > 0.0:
-                    return False
-                work[i, i] = math.sqrt(s)
-            else:
-                work[i, j] = s / work[j, j]
     return True
 
 

@@ -7,7 +7,7 @@ import math
 from opspace.law.compiled.algebra import (
     apply_reflectors,
     apply_reflectors_transposed,
-    exceeds,
+    cholesky,
     gram,
     householder,
     singular_values,
@@ -96,7 +96,7 @@ def _solve_wide(d, m, n, r, last, bound, s):
     """Rows that are all active: x = Q R⁻ᵀ residual; what is left free is the rest of Q."""
     B, G, R, x, scale, residual = s.B, s.G, s.R, s.x, s.scale, s.residual
     gram(B, m, r, G)
-    regular = exceeds(G, m, bound, s.Y)
+    regular = cholesky(G, m, bound, s.Y)
     householder(B, m, r, scale, R)
     if not regular:
         return False
@@ -158,7 +158,7 @@ def _solve_tall(d, m, n, r, bound, s):
         for i in range(m):
             C[b, i] = B[i, b]
     gram(C, r, m, G)
-    if not exceeds(G, r, bound, s.Y):
+    if not cholesky(G, r, bound, s.Y):
         return False
     householder(C, r, m, scale, R)
     for i in range(m):
