@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +12,9 @@ from opspace.errors import InputError
 from opspace.record.format import Column, Ended
 from opspace.record.writer import Recorder
 from opspace.tasks import Task
+
+State = Callable[[], tuple[np.ndarray, np.ndarray]]
+"""Tells a configuration (nq,) and a velocity (n,)."""
 
 _NOTHING = np.zeros(0)
 
@@ -84,6 +87,8 @@ class TickRecorder:
         header: What the recording says about itself: scenario, seed, time step.
         tasks: Tasks that will be inserted later.
         levels: Tasks that may ever be at each level, by its number; None takes those of the stack.
+        truth: Tells the true state where the sensors are noisy; it is recorded as ``true/q`` and
+            ``true/v``. None where the measured state is the true one.
         overwrite: Replace a recording that is already there.
 
     Raises:
@@ -100,6 +105,7 @@ class TickRecorder:
         *,
         tasks: Sequence[Task] = (),
         levels: Mapping[float, Sequence[Task]] | None = None,
+        truth: State | None = None,
         overwrite: bool = False,
     ) -> None:
         stack = controller.stack
@@ -114,7 +120,10 @@ class TickRecorder:
         levels = stack.levels_by_number if levels is None else levels
         self._rows = {task.name: task.rows for task in [*stack, *tasks]}
         self._levels = {number: _directions(controller, level) for number, level in levels.items()}
+        self._truth = truth
         columns = columns_of(controller, tasks, levels)
+        if truth is not None:
+            columns += _truth_columns(controller)
         self._recorder = Recorder(directory, columns, header, overwrite=overwrite)
 
     def observe(self, q: np.ndarray, v: np.ndarray, command: Command) -> None:
@@ -133,11 +142,24 @@ class TickRecorder:
         if controller.stack.limits is not None:
             parts.append([command.limits.get(s.name, 0.0) for s in controller.stack.limits.sides])
         parts.append([float(command.hard_solves), float(command.status)])
+        if self._truth is not None:
+            parts += self._truth()
         self._recorder.append(np.concatenate(parts))
 
     def close(self, how: Ended = "completed", reason: str = "") -> None:
         """Finish the recording and say how the run ended."""
         self._recorder.close(how, reason)
+
+
+def _truth_columns(controller: ReferenceController) -> list[Column]:
+    return [
+        Column(f"true/{group}/{joint}", unit, f"{what} of {joint}, without the sensors' noise")
+        for group, unit, what in (
+            ("q", "rad", "joint position"),
+            ("v", "rad/s", "joint velocity"),
+        )
+        for joint in controller.robot.joint_names
+    ]
 
 
 def _directions(controller: ReferenceController, level: Sequence[Task]) -> int:

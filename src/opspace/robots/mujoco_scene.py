@@ -10,6 +10,8 @@ import numpy as np
 
 LINK_RGBA = (0.88, 0.89, 0.91, 1.0)
 JOINT_RGBA = (0.20, 0.36, 0.58, 1.0)
+RADIUS = 0.045
+"""Of the largest ball that stands for a joint, m."""
 
 
 def add_skeleton(spec: mujoco.MjSpec) -> None:
@@ -22,7 +24,9 @@ def add_skeleton(spec: mujoco.MjSpec) -> None:
     """
     moving = [body for body in spec.bodies if body.joints]
     offsets = [float(np.linalg.norm(body.pos)) for body in moving]
-    radius = min(0.045, 0.3 * float(np.mean(offsets))) if offsets else 0.0
+    spacing = float(np.mean(offsets)) if offsets else 0.0
+    # Joints may all lie in one point.
+    radius = min(RADIUS, 0.3 * spacing) if spacing > 0.0 else RADIUS
     for body in spec.bodies:
         parent = body.parent
         if parent is None or parent.name == spec.worldbody.name:

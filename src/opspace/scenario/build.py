@@ -8,12 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from opspace.controller import Controller, ReferenceController, Singularity
-from opspace.errors import OpspaceError, UnknownNameError
+from opspace.errors import InputError, OpspaceError, UnknownNameError
 from opspace.robots import Robot, load_robot
 from opspace.scenario.build_tasks import build_tasks, check_configuration, configuration
 from opspace.scenario.events import in_order, insertion_level, late_tasks
 from opspace.scenario.schema import Scenario
-from opspace.sim import Plant, StopRule
+from opspace.sim import Disturbances, Plant, Push, StopRule
 from opspace.stack import Stack
 from opspace.tasks import JointLimits, Task
 
@@ -76,15 +76,32 @@ def build(scenario: Scenario, controller: type[ReferenceController] = Controller
     except UnknownNameError as error:
         raise scenario.error(("joint_limits", "joints"), str(error)) from error
     _schedule(scenario, stack, tasks)
-    plant = Plant(
-        robot,
-        q,
-        dt=scenario.dt,
-        friction=scenario.plant.friction,
-        torque_limits=scenario.plant.torque_limits,
-    )
+    plant = _plant(scenario, robot, q)
     stop = StopRule(scenario.stop.max_joint_speed, scenario.stop.max_torque)
     return Built(scenario, robot, stack, tasks, driver, plant, stop)
+
+
+def _plant(scenario: Scenario, robot: Robot, q: np.ndarray) -> Plant:
+    option = scenario.plant
+    try:
+        return Plant(
+            robot,
+            q,
+            dt=scenario.dt,
+            friction=option.friction,
+            torque_limits=option.torque_limits,
+            disturbances=Disturbances(
+                mass_error=option.mass_error,
+                dry_friction=option.dry_friction,
+                delay=option.delay,
+                position_noise=option.position_noise,
+                velocity_noise=option.velocity_noise,
+                pushes=[Push(push.at, push.duration, push.force) for push in option.pushes],
+                seed=scenario.seed,
+            ),
+        )
+    except InputError as error:
+        raise scenario.error(("plant",), str(error)) from error
 
 
 def build_robot(scenario: Scenario) -> Robot:

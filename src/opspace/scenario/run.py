@@ -7,7 +7,7 @@ from pathlib import Path
 
 from opspace.record import Recording, load
 from opspace.record.format import write_json
-from opspace.record.observer import TickRecorder
+from opspace.record.observer import State, TickRecorder
 from opspace.scenario.build import Built, build
 from opspace.scenario.events import late_tasks, levels_visited
 from opspace.scenario.load import dump_scenario, to_dict
@@ -15,7 +15,7 @@ from opspace.scenario.metrics import Metrics, measure
 from opspace.scenario.progress import ProgressBar
 from opspace.scenario.references import return_time
 from opspace.scenario.schema import Scenario
-from opspace.sim import Observer, Outcome, simulate
+from opspace.sim import Observer, Outcome, Plant, simulate
 
 METRICS = "metrics.json"
 SCENARIO = "scenario.yaml"
@@ -73,6 +73,7 @@ def run_scenario(
             number: [built.tasks[name] for name in names]
             for number, names in levels_visited(scenario.events, scenario.tasks).items()
         },
+        truth=_truth(built.plant),
         overwrite=overwrite,
     )
     (out / METRICS).unlink(missing_ok=True)
@@ -89,6 +90,10 @@ def run_scenario(
     )
     write_json(out / METRICS, metrics.to_json())
     return RunResult(out, outcome, recording, metrics)
+
+
+def _truth(plant: Plant) -> State | None:
+    return (lambda: (plant.q, plant.v)) if plant.noisy else None
 
 
 def limited_joint(scenario: Scenario) -> str | None:

@@ -72,10 +72,39 @@ class JointLimits(Entry):
         return joints
 
 
+class Push(Entry):
+    """A force on the tool for some time."""
+
+    at: Annotated[float, Quantity("s", at_least=0.0)] = Field(description="when it begins [s]")
+    duration: Annotated[float, Quantity("s", above=0.0)] = Field(
+        description="how long it lasts [s]"
+    )
+    force: Annotated[tuple[float, ...], Quantity("N", size=3)] = Field(
+        description="force in world axes [N]"
+    )
+
+
 class Plant(Entry):
     """What the simulated robot has and the controller does not know about."""
 
-    friction: bool = Field(default=False, description="simulate the joints' friction")
+    friction: bool = Field(default=False, description="simulate the friction in the robot's file")
+    dry_friction: Annotated[float, Quantity("1", at_least=0.0, at_most=1.0)] = Field(
+        default=0.0, description="dry friction of every joint, as a part of its torque limit"
+    )
+    mass_error: Annotated[float, Quantity("1", at_least=0.0, at_most=0.9)] = Field(
+        default=0.0,
+        description="every link's mass and inertia are off by up to this part, drawn from the seed",
+    )
+    delay: Annotated[float, Quantity("s", at_least=0.0, at_most=0.1)] = Field(
+        default=0.0, description="how late a torque reaches the joints [s], in whole ticks"
+    )
+    position_noise: Annotated[float, Quantity("rad or m", at_least=0.0)] = Field(
+        default=0.0, description="standard deviation of measured joint positions [rad or m]"
+    )
+    velocity_noise: Annotated[float, Quantity("rad/s or m/s", at_least=0.0)] = Field(
+        default=0.0, description="standard deviation of measured joint velocities [rad/s or m/s]"
+    )
+    pushes: list[Push] = Field(default_factory=list, description="forces on the tool, with times")
     torque_limits: bool = Field(
         default=True, description="saturate the torque at the robot's limits"
     )

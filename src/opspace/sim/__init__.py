@@ -1,5 +1,7 @@
 """The plant and the one loop around it."""
 
+from opspace.sim.disturbances import Disturbances as Disturbances
+from opspace.sim.disturbances import Push as Push
 from opspace.sim.loop import Observer as Observer
 from opspace.sim.loop import Outcome as Outcome
 from opspace.sim.loop import StopRule as StopRule

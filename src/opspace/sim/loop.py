@@ -19,7 +19,7 @@ class Observer(Protocol):
     """Something that watches a run without changing it: a recorder, a progress bar, a viewer."""
 
     def observe(self, q: np.ndarray, v: np.ndarray, command: Command) -> None:
-        """See one tick: the state, and the command computed for it."""
+        """See one tick: the measured state, and the command computed for it."""
         ...
 
 
@@ -107,13 +107,13 @@ def simulate(
     t = start
     for tick in range(round(duration / plant.dt)):
         t = start + tick * plant.dt
-        q, v = plant.q, plant.v
-        if not (np.all(np.isfinite(q)) and np.all(np.isfinite(v))):
+        if not (np.all(np.isfinite(plant.q)) and np.all(np.isfinite(plant.v))):
             return Outcome(False, t, "the simulation diverged")
+        q, v = plant.measure()
         command = controller.step(t, q, v)
         for observer in observers:
             observer.observe(q, v, command)
-        reason = stop.reason(joints, v, command.tau)
+        reason = stop.reason(joints, plant.v, command.tau)
         if reason:
             return Outcome(False, t, reason)
         plant.advance(command.tau)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from opspace.errors import InputError, ModelError, missing_extra
+from opspace.sim.disturbances import NO_DISTURBANCES, Disturbances, Hand, Wire
 
 if TYPE_CHECKING:
     from opspace.robots.protocol import Robot
@@ -31,11 +32,12 @@ class Plant:
         dt: Time step, s.
         friction: Simulate the joint friction that the model has; the controller does not know it.
         torque_limits: Saturate the torque at the robot's limits.
+        disturbances: What the controller's model does not know.
 
     Raises:
         MissingExtraError: MuJoCo is not installed.
         ModelError: The robot has no file, or MuJoCo cannot simulate it.
-        InputError: The start state does not fit the robot.
+        InputError: The start state or a disturbance does not fit the robot.
     """
 
     def __init__(
@@ -47,6 +49,7 @@ class Plant:
         dt: float = 0.001,
         friction: bool = False,
         torque_limits: bool = True,
+        disturbances: Disturbances = NO_DISTURBANCES,
     ) -> None:
         if not (math.isfinite(dt) and dt > 0.0):
             raise InputError(f"the time step must be above 0 s, got {dt}")
@@ -71,8 +74,15 @@ class Plant:
         if not friction:
             self.model.dof_damping[:] = 0.0
             self.model.dof_frictionloss[:] = 0.0
+        disturbances.spoil(self.model, robot.torque_limit)
         self._limit = robot.torque_limit if torque_limits else np.full(robot.nv, np.inf)
+        self._robot = robot
+        self._wire = Wire(round(disturbances.delay / dt))
+        self._hand = Hand(robot, disturbances.pushes)
+        self._sensors = disturbances.sensors()
         self.data = mujoco.MjData(self.model)
+        if disturbances.mass_error:
+            mujoco.mj_setConst(self.model, self.data)
         start = np.asarray(q, dtype=float)
         if start.shape != (self.model.nq,) or not np.all(np.isfinite(start)):
             raise InputError(
@@ -104,11 +114,22 @@ class Plant:
         """Velocity, (n,), rad/s, a copy."""
         return np.array(self.data.qvel)
 
+    @property
+    def noisy(self) -> bool:
+        """Whether what is measured differs from the state."""
+        return self._sensors.noisy
+
+    def measure(self) -> tuple[np.ndarray, np.ndarray]:
+        """Read the sensors: configuration (nq,) and velocity (n,), with their noise."""
+        return self._sensors.read(self._robot, self.q, self.v)
+
     def advance(self, tau: np.ndarray) -> None:
         """Hold a joint torque for one time step.
 
         Args:
             tau: (n,) N·m.
         """
-        self.data.qfrc_applied[:] = np.clip(tau, -self._limit, self._limit)
+        applied = np.clip(self._wire.send(tau), -self._limit, self._limit)
+        push = self._hand.torque(self.t, self.data.qpos, self.data.qvel)
+        self.data.qfrc_applied[:] = applied if push is None else applied + push
         self._mujoco.mj_step(self.model, self.data)
