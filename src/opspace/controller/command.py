@@ -28,6 +28,11 @@ class Status(IntFlag):
     """Time stood still, ran backwards, or jumped by more than ten periods."""
     STALE = 128
     """The state is that of the tick before to the last bit, although the robot moves."""
+    FILTERED = 256
+    """The torque is the nearest one that keeps what every joint may do: limits pushed each other, or
+    the motors."""
+    LIMIT_LOST = 512
+    """No torque of the motors keeps what every joint may do; the excess is as small as can be."""
     FAULT = 8
     """No finite torque was found; the command is bias compensation with damping."""
 

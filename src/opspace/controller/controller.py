@@ -32,7 +32,7 @@ from opspace.robots.base import AdapterBase
 from opspace.robots.motion_axes import MotionAxes
 from opspace.stack import Member
 
-STATUSES = tuple(Status(bits) for bits in range(256))
+STATUSES = tuple(Status(bits) for bits in range(1024))
 
 
 class Controller(ReferenceController):

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
+from opspace.controller.bounds import keep_bounds
 from opspace.controller.command import Command, Found, Status
 from opspace.controller.joint_limits import (
     Insertion,
@@ -155,9 +156,9 @@ class ReferenceController:
         terms = [member.task.evaluate(robot, t) for member in members]
         mixed = mixture(members, activations, t, self._blending)
         task_sets, blend = self._task_sets(members, activations, terms, mixed)
-        tau, info, limits = self._torque(task_sets, blend)
+        tau, info, limits, kept = self._torque(task_sets, blend)
         tau, status = self._checked(tau, limits)
-        status |= timing
+        status |= timing | kept
         if any(level.scale < 1.0 - 1e-12 for level in info.levels):
             status |= Status.TORQUE_SCALED
         levels = level_status(members, mixed, info, len(limits))
@@ -215,13 +216,13 @@ class ReferenceController:
 
     def _torque(
         self, tasks: list[TaskSet], blend: Sequence[Weighted]
-    ) -> tuple[np.ndarray, LawInfo, dict[str, float]]:
+    ) -> tuple[np.ndarray, LawInfo, dict[str, float], Status]:
         """The law (Eq. 19-23), with the joint limits that its own answer calls for."""
         L = np.linalg.cholesky(self.robot.M)
         tau, info = self._law(L, [], tasks, blend)
         limits = self.stack.limits
         if limits is None:
-            return tau, info, {}
+            return tau, info, {}, Status.OK
         robot = self.robot
         terms = limit_terms(limits, robot.q, robot.v)
         inserted: dict[str, Insertion] = {}
@@ -233,7 +234,11 @@ class ReferenceController:
             inserted = again
             sets = limit_task_sets(terms, inserted, robot.nv, self._scales.joint)
             tau, info = self._law(L, sets, tasks, blend)
-        return tau, info, {name: limit.activation for name, limit in inserted.items()}
+        kept = Status.OK
+        if limits.mode == "admissible":
+            motors = robot.torque_limit if self.torque_limits == "priority" else None
+            tau, kept = keep_bounds(terms, robot.M, robot.bias, tau, motors)
+        return tau, info, {name: limit.activation for name, limit in inserted.items()}, kept
 
     def _law(
         self,

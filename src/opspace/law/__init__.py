@@ -2,6 +2,7 @@
 
 from opspace.law.activation import PROFILES, Activation, Buffer, Profile, Ramp
 from opspace.law.blending import BLENDINGS, Weighted, combined, corners
+from opspace.law.nearest import BROKEN, LOST, excess, nearest_acceleration
 from opspace.law.singularity import SigmaBuffer
 from opspace.law.tasksets import TaskSet
 from opspace.law.torque import COUPLINGS, LawInfo, blended_torque, intermediate_values, task_torque
@@ -9,7 +10,9 @@ from opspace.law.tree import Motors
 
 __all__ = [
     "BLENDINGS",
+    "BROKEN",
     "COUPLINGS",
+    "LOST",
     "PROFILES",
     "Activation",
     "Buffer",
@@ -23,6 +26,8 @@ __all__ = [
     "blended_torque",
     "combined",
     "corners",
+    "excess",
     "intermediate_values",
+    "nearest_acceleration",
     "task_torque",
 ]

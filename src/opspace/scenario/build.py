@@ -173,6 +173,7 @@ def _joint_limits(scenario: Scenario) -> JointLimits | None:
         option.buffer,
         mode=option.mode,
         joints=option.joints,
+        speeds=option.speeds,
         brake_acceleration=option.brake_acceleration,
         profile=SWITCH if scenario.method == "switch" else option.profile,
     )

@@ -54,6 +54,9 @@ class JointLimits(Entry):
     joints: dict[str, Annotated[tuple[float, ...], Quantity("rad or m", size=2)]] = Field(
         default_factory=dict, description="joint: [lower, upper] in place of the robot's own limits"
     )
+    speeds: dict[str, Annotated[float, Quantity("rad/s or m/s", above=0.0)]] = Field(
+        default_factory=dict, description="joint: largest speed in place of the robot's own limit"
+    )
     buffer: Annotated[float, Quantity("rad or m", above=0.0)] = Field(
         default=0.1, description="width of the buffer inside each limit, for mode buffer [rad or m]"
     )

@@ -33,6 +33,7 @@ class Side:
         sign: +1 for the upper limit, −1 for the lower one.
         limit: Position of the limit, rad or m.
         brake: Acceleration with which the joint can be counted on to brake, rad/s² or m/s².
+        speed: Largest speed in this direction, rad/s or m/s; inf where there is none.
     """
 
     joint: str
@@ -40,6 +41,7 @@ class Side:
     sign: float
     limit: float
     brake: float
+    speed: float = math.inf
 
     @property
     def name(self) -> str:
@@ -55,9 +57,10 @@ class JointLimits:
         v_adm(d) = k₁ d                    for 0 <= d <= a/k₁²
                    √(2 a (d − a/2k₁²))     beyond            (constant braking; C¹ where they meet)
                    −v_r tanh(k₁ |d| / v_r) outside the limit
-        q̈_adm = −v v_adm'(d) + k₂ (v_adm(d) − v)
+        q̈_adm = min(−v v_adm'(d) + k₂ (v_adm(d) − v), k₂ (v_max − v))
 
-    is the largest acceleration towards the limit from which the joint still stops at it.
+    is the largest acceleration towards the limit from which the joint still stops at it, and with
+    which it does not become faster than v_max.
 
     In mode ``admissible`` a joint gets the smaller of q̈_adm and a_other, its acceleration under
     the stack without this limit: the task set asks for min(a_other, q̈_adm), with the activation
@@ -75,6 +78,8 @@ class JointLimits:
         buffer: Width of the position buffer, rad or m; used in mode ``buffer``.
         mode: One of `MODES`.
         joints: Limits (lower, upper) by joint name that replace the robot's own, rad or m.
+        speeds: Largest speed by joint name in place of the robot's own, rad/s or m/s; inf for none.
+            Used in mode ``admissible``.
         brake_acceleration: a, rad/s² or m/s²; None derives it per joint from the torque limits.
         profile: Name of the activation profile.
 
@@ -93,6 +98,7 @@ class JointLimits:
         *,
         mode: str = "admissible",
         joints: Mapping[str, Sequence[float]] | None = None,
+        speeds: Mapping[str, float] | None = None,
         brake_acceleration: float | None = None,
         profile: str = "quintic",
     ) -> None:
@@ -111,6 +117,7 @@ class JointLimits:
         self.profile = profile
         self.brake_acceleration = brake_acceleration
         self._joints = {name: _pair(name, limits) for name, limits in (joints or {}).items()}
+        self._speeds = {name: _speed(name, speed) for name, speed in (speeds or {}).items()}
         self.sides: tuple[Side, ...] = ()
 
     def bind(self, robot: Robot, brake: Array) -> None:
@@ -123,7 +130,7 @@ class JointLimits:
         Raises:
             UnknownNameError: A joint that the robot does not have.
         """
-        for name in self._joints:
+        for name in (*self._joints, *self._speeds):
             if name not in robot.joint_names:
                 raise unknown_name("joint", name, robot.joint_names)
         sides: list[Side] = []
@@ -131,10 +138,13 @@ class JointLimits:
             own = (float(robot.q_lower[index]), float(robot.q_upper[index]))
             limits = self._joints.get(joint, own)
             a = float(brake[index]) if self.brake_acceleration is None else self.brake_acceleration
+            speed = self._speeds.get(joint, float(robot.velocity_limit[index]))
+            if self.mode == "buffer":
+                speed = math.inf
             sides += [
-                Side(joint, index, sign, limit, a)
+                Side(joint, index, sign, limit, a, speed)
                 for sign, limit in zip((-1.0, 1.0), limits, strict=True)
-                if math.isfinite(limit)
+                if math.isfinite(limit) or math.isfinite(speed)
             ]
         self.sides = tuple(sides)
 
@@ -156,7 +166,9 @@ class JointLimits:
         distance = side.sign * (side.limit - position)
         towards = side.sign * speed
         allowed, slope = self._allowed_speed(distance, side.brake)
-        return -towards * slope + self.k2 * (allowed - towards)
+        return min(
+            -towards * slope + self.k2 * (allowed - towards), self.k2 * (side.speed - towards)
+        )
 
     def _allowed_speed(self, d: float, a: float) -> tuple[float, float]:
         if d < 0.0:
@@ -185,6 +197,12 @@ class JointLimits:
         distance = side.sign * (side.limit - position)
         command = self.kp * (distance - self.buffer) - 2.0 * math.sqrt(self.kp) * towards
         return command, inner, 0.0
+
+
+def _speed(name: str, speed: float) -> float:
+    if not speed > 0.0:
+        raise InputError(f"the largest speed of {name!r} must be above 0, got {speed}")
+    return float(speed)
 
 
 def _pair(name: str, limits: Sequence[float]) -> tuple[float, float]:

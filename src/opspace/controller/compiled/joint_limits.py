@@ -1,11 +1,15 @@
-"""Joint limits of one tick, as `opspace.controller.joint_limits` finds them."""
+"""Joint limits of one tick, as `opspace.controller.joint_limits` finds them, and what keeps them."""
 
 from __future__ import annotations
 
 import math
 
+import numpy as np
+
+from opspace.controller.command import Status
 from opspace.controller.compiled.layout import (
     BUFFER,
+    KEEP_TORQUE,
     LIMIT_BUFFER,
     LIMIT_K1,
     LIMIT_K2,
@@ -14,11 +18,17 @@ from opspace.controller.compiled.layout import (
     LIMIT_PROFILE,
     LIMIT_RETURN_SPEED,
 )
+from opspace.law.compiled.algebra import solve_lower, solve_lower_transposed
 from opspace.law.compiled.jit import jit
+from opspace.law.compiled.nearest import nearest_acceleration
 from opspace.law.compiled.profiles import profile
+from opspace.law.nearest import BROKEN, LOST
+
+FILTERED = int(Status.FILTERED)
+LIMIT_LOST = int(Status.LIMIT_LOST)
 
 # Columns of Tick.limit.
-SIGN, POSITION, BRAKE, MARGIN, COMMAND = range(5)
+SIGN, POSITION, BRAKE, MARGIN, COMMAND, SPEED = range(6)
 
 
 @jit
@@ -36,7 +46,9 @@ def begin_limits(k):
             limit[COMMAND] = kp * (distance - buffer) - 2.0 * math.sqrt(kp) * towards
         else:
             allowed, slope = _allowed_speed(k.option, distance, limit[BRAKE])
-            limit[COMMAND] = -towards * slope + k.option[LIMIT_K2] * (allowed - towards)
+            k2 = k.option[LIMIT_K2]
+            stopping = -towards * slope + k2 * (allowed - towards)
+            limit[COMMAND] = min(stopping, k2 * (limit[SPEED] - towards))
 
 
 @jit
@@ -88,3 +100,61 @@ def _by_position(k, limit, q, v, shape):
     inner = k.option[LIMIT_BUFFER] + towards * towards / (2.0 * limit[BRAKE])
     distance = limit[SIGN] * (limit[POSITION] - q)
     return profile(shape, (distance - inner) / (0.0 - inner))
+
+
+@jit
+def keep_bounds(k):
+    """Replace the torque by the nearest one with which no joint accelerates more than it may.
+
+    Returns:
+        What happened, in the numbers of `opspace.Status`.
+    """
+    if k.option[LIMIT_MODE] == BUFFER:
+        return 0
+    n = k.v.shape[0]
+    x = k.joint_acceleration
+    for a in range(n):
+        x[a] = k.tau[a] - k.bias[a]
+    solve_lower(k.L, n, x)
+    solve_lower_transposed(k.L, n, x)
+    if not _excess(k) > BROKEN:
+        return 0
+    lower, upper, least, most = _bounds(k)
+    nearest_acceleration(k.L, x, lower, upper, least, most)
+    for a in range(n):
+        k.tau[a] = k.bias[a]
+        for b in range(n):
+            k.tau[a] += k.M[a, b] * x[b]
+        if k.option[KEEP_TORQUE] != 0.0:
+            k.tau[a] = min(max(k.tau[a], -k.torque_limit[a]), k.torque_limit[a])
+    return FILTERED | LIMIT_LOST if _excess(k) > LOST else FILTERED
+
+
+@jit
+def _excess(k):
+    """The largest excess over what a joint may do, see `opspace.law.excess`."""
+    most = -math.inf
+    for i in range(k.limit.shape[0]):
+        limit = k.limit[i]
+        over = limit[SIGN] * k.joint_acceleration[k.limit_joint[i]] - limit[COMMAND]
+        most = max(most, over / max(1.0, abs(limit[COMMAND])))
+    return most
+
+
+@jit
+def _bounds(k):
+    """Least and largest acceleration and torque beside the bias of every joint."""
+    n = k.v.shape[0]
+    lower, upper = np.full(n, -math.inf), np.full(n, math.inf)
+    least, most = np.full(n, -math.inf), np.full(n, math.inf)
+    for i in range(k.limit.shape[0]):
+        limit, j = k.limit[i], k.limit_joint[i]
+        if limit[SIGN] > 0.0:
+            upper[j] = limit[COMMAND]
+        else:
+            lower[j] = -limit[COMMAND]
+    if k.option[KEEP_TORQUE] != 0.0:
+        for a in range(n):
+            least[a] = -k.torque_limit[a] - k.bias[a]
+            most[a] = k.torque_limit[a] - k.bias[a]
+    return lower, upper, least, most

@@ -76,7 +76,7 @@ OPTION_SIZE = 16
 
 # What a tick answers when there is no torque, and what a hard torque counts in its answer.
 STATE_NOT_FINITE, NOT_FINITE, NOT_POSITIVE_DEFINITE = -1, -2, -3
-SOLVE = 256
+SOLVE = 1024
 
 
 class Tick(NamedTuple):
@@ -93,7 +93,7 @@ class Tick(NamedTuple):
     ``slots`` (slots, 3: depth, first row, rows) in the order of the levels,
     ``slot_on`` and ``slot_off``: variables that must be on or off for a task to be there,
     ``slot_place``: those of them that choose its place; ``own``: activation of each task by its
-    own function; ``limit_joint`` and ``limit`` (limits, 4: side, position, braking acceleration,
+    own function; ``limit_joint`` and ``limit`` (limits, 6: side, position, braking acceleration,
     margin) of joint limits; ``torque_limit``; ``option``.
 
     What it writes, all in one block of memory: ``tau``, ``h`` of each task, ``share`` of each slot,

@@ -173,7 +173,7 @@ def _arrivals(members: Sequence[Member]) -> list[Variable]:
 def _pack_limits(limits: JointLimits, scales: Scales, tick: Tick) -> None:
     for i, side in enumerate(limits.sides):
         tick.limit_joint[i] = side.index
-        tick.limit[i] = side.sign, side.limit, side.brake, limits.margin(side), 0.0
+        tick.limit[i] = side.sign, side.limit, side.brake, limits.margin(side), 0.0, side.speed
     option = tick.option
     option[LIMIT_MODE] = BUFFER if limits.mode == "buffer" else ADMISSIBLE
     option[LIMIT_PROFILE] = PROFILE_CODE[limits.profile]

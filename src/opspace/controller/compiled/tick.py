@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from opspace.controller.command import Status
-from opspace.controller.compiled.joint_limits import SIGN, begin_limits, insert_limits
+from opspace.controller.compiled.joint_limits import SIGN, begin_limits, insert_limits, keep_bounds
 from opspace.controller.compiled.layout import (
     COVERS_ALL,
     DAMPING,
@@ -73,9 +73,10 @@ def tick(t, k):
             law(k, stacks, limit_stacks)
             solves = stacks * limit_stacks
     torque(k)
+    kept = keep_bounds(k) if k.limit.shape[0] > 0 else 0
     if not _finite(k.tau):
         return NOT_FINITE
-    return status(k) + SOLVE * solves
+    return (status(k) | kept) + SOLVE * solves
 
 
 @jit

@@ -14,7 +14,7 @@ SOURCES = [
     path
     for part in ("law", "controller")
     for path in sorted((Path(__file__).parents[2] / part / "compiled").glob("*.py"))
-] + [Path(__file__).parents[1] / "saturation.py"]
+] + [Path(__file__).parents[1] / name for name in ("saturation.py", "nearest.py")]
 
 FAST = {"reassoc", "contract"}
 """Sums may be taken in another order, four at a time; inf and nan stay what they are."""
