@@ -274,6 +274,66 @@ def bench(
     print(f"results: {out}")
 
 
+@app.command(epilog="Example: opspace sweep showpiece --vary tasks.position.kp=20..200 --runs 50")
+def sweep(
+    scenario: Annotated[
+        str,
+        typer.Argument(
+            help="A scenario file (.yaml), the name of one that is shipped, or the word random: "
+            "every run draws robot, tasks, targets, transitions, model errors and pushes."
+        ),
+    ],
+    overrides: Overrides = None,
+    vary: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--vary",
+            metavar="KEY=VALUES",
+            help="LOW..HIGH, log LOW..HIGH or [VALUE, ...]; may be repeated.",
+        ),
+    ] = None,
+    runs: Annotated[
+        int | None, typer.Option(help="Runs to draw. [default: every combination once]")
+    ] = None,
+    seed: Annotated[int, typer.Option(help="Seed of everything that is drawn.")] = 0,
+    jobs: Annotated[
+        int | None, typer.Option(help="Runs at a time. [default: one per core]")
+    ] = None,
+    ray: Annotated[
+        str | None, typer.Option(metavar="ADDRESS", help="Run on this Ray cluster instead.")
+    ] = None,
+    timeout: Annotated[float, typer.Option(help="Seconds allowed to one run.")] = 120.0,
+    out: Annotated[
+        Path | None, typer.Option(help="Directory to write to. [default: results/sweep/NAME]")
+    ] = None,
+) -> None:
+    """Run a scenario many times, in parallel; the same command again goes on where it was."""
+    from opspace.errors import InputError
+    from opspace.plots import save
+    from opspace.plots.sweep import sweep_figure
+    from opspace.scenario import load_scenario
+    from opspace.scenario.load import to_dict
+    from opspace.scenario.progress import counter
+    from opspace.sweep import SweepPlan, Variation, run_sweep
+    from opspace.sweep.measures import UNITS
+    from opspace.sweep.plan import RANDOM
+
+    drawn = scenario == RANDOM
+    if drawn and overrides:
+        raise InputError("opspace sweep random takes no --set; use --vary KEY=[VALUE]")
+    base = None if drawn else to_dict(load_scenario(scenario, overrides or ()))
+    plan = SweepPlan(base, [Variation.read(text) for text in vary or ()], runs, seed)
+    out = out or Path("results") / "sweep" / Path(scenario).stem
+    with counter("runs") as progress:
+        found = run_sweep(plan, out, jobs=jobs, ray=ray, timeout=timeout, progress=progress)
+    _print_table(*found.table())
+    print(", ".join(f"{count} {how}" for how, count in found.endings().most_common()))
+    for row in found.failed:
+        print(f"run {row['index']} {row['ended']}: {row['reason']}\n  {found.command(row)}")
+    save(sweep_figure(found.rows, UNITS), out / "sweep.png")
+    print(f"results: {out}")
+
+
 @app.command(epilog="Example: opspace check ur5")
 def check(
     robot: Annotated[str, typer.Argument(help="Name of a robot, or path of a .urdf or .xml file.")],

@@ -73,8 +73,8 @@ def build(scenario: Scenario, controller: type[ReferenceController] = Controller
             bias=scenario.bias,
             singularity=_singularity(scenario),
         )
-    except UnknownNameError as error:
-        raise scenario.error(("joint_limits", "joints"), str(error)) from error
+    except (UnknownNameError, InputError) as error:
+        raise scenario.error(("joint_limits",), str(error)) from error
     _schedule(scenario, stack, tasks)
     plant = _plant(scenario, robot, q)
     stop = StopRule(scenario.stop.max_joint_speed, scenario.stop.max_torque)
@@ -174,6 +174,7 @@ def _joint_limits(scenario: Scenario) -> JointLimits | None:
         mode=option.mode,
         joints=option.joints,
         speeds=option.speeds,
+        clearance=option.clearance,
         brake_acceleration=option.brake_acceleration,
         profile=SWITCH if scenario.method == "switch" else option.profile,
     )

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from types import TracebackType
 from typing import TYPE_CHECKING
 
@@ -97,3 +99,35 @@ class ProgressLine:
     def finish(self, t: float) -> None:
         """Show where the run ended."""
         self._bar.move(self._line, t)
+
+
+@contextmanager
+def counter(what: str) -> Iterator[Callable[[int, int], None]]:
+    """Show how many of something are done, on the terminal's error stream where there is one.
+
+    Args:
+        what: What is counted.
+
+    Yields:
+        A function that takes how many are done, and of how many.
+    """
+    from rich.console import Console  # noqa: PLC0415 - slow to import
+    from rich.progress import (  # noqa: PLC0415
+        BarColumn,
+        MofNCompleteColumn,
+        Progress,
+        TextColumn,
+        TimeElapsedColumn,
+        TimeRemainingColumn,
+    )
+
+    console = Console(stderr=True)
+    columns = (TextColumn(what, markup=False), BarColumn(), MofNCompleteColumn())
+    times = (TimeElapsedColumn(), TextColumn("left", markup=False), TimeRemainingColumn())
+    with Progress(*columns, *times, console=console, disable=not console.is_terminal) as progress:
+        line = progress.add_task(what, total=None)
+
+        def show(done: int, total: int) -> None:
+            progress.update(line, completed=done, total=total)
+
+        yield show

@@ -54,6 +54,9 @@ class JointLimits(Entry):
     joints: dict[str, Annotated[tuple[float, ...], Quantity("rad or m", size=2)]] = Field(
         default_factory=dict, description="joint: [lower, upper] in place of the robot's own limits"
     )
+    clearance: Annotated[float, Quantity("rad or m", at_least=0.0)] = Field(
+        default=0.0, description="how far inside its limits every joint is kept [rad or m]"
+    )
     speeds: dict[str, Annotated[float, Quantity("rad/s or m/s", above=0.0)]] = Field(
         default_factory=dict, description="joint: largest speed in place of the robot's own limit"
     )

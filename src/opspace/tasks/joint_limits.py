@@ -80,6 +80,8 @@ class JointLimits:
         joints: Limits (lower, upper) by joint name that replace the robot's own, rad or m.
         speeds: Largest speed by joint name in place of the robot's own, rad/s or m/s; inf for none.
             Used in mode ``admissible``.
+        clearance: How far inside its limits every joint is kept, rad or m. An acceleration that is wrong
+            by δ, because masses or friction are, lets a joint rest δ/(k₁ k₂) beyond where it should.
         brake_acceleration: a, rad/s² or m/s²; None derives it per joint from the torque limits.
         profile: Name of the activation profile.
 
@@ -99,6 +101,7 @@ class JointLimits:
         mode: str = "admissible",
         joints: Mapping[str, Sequence[float]] | None = None,
         speeds: Mapping[str, float] | None = None,
+        clearance: float = 0.0,
         brake_acceleration: float | None = None,
         profile: str = "quintic",
     ) -> None:
@@ -112,7 +115,10 @@ class JointLimits:
             raise InputError(
                 f"joint limits: brake_acceleration must be above 0, got {brake_acceleration}"
             )
+        if not (math.isfinite(clearance) and clearance >= 0.0):
+            raise InputError(f"joint limits: clearance must be at least 0, got {clearance}")
         self.buffer = float(buffer)
+        self.clearance = float(clearance)
         self.mode = mode
         self.profile = profile
         self.brake_acceleration = brake_acceleration
@@ -129,6 +135,7 @@ class JointLimits:
 
         Raises:
             UnknownNameError: A joint that the robot does not have.
+            InputError: The clearance leaves a joint no range.
         """
         for name in (*self._joints, *self._speeds):
             if name not in robot.joint_names:
@@ -136,7 +143,7 @@ class JointLimits:
         sides: list[Side] = []
         for index, joint in enumerate(robot.joint_names):
             own = (float(robot.q_lower[index]), float(robot.q_upper[index]))
-            limits = self._joints.get(joint, own)
+            limits = self._inside(joint, self._joints.get(joint, own))
             a = float(brake[index]) if self.brake_acceleration is None else self.brake_acceleration
             speed = self._speeds.get(joint, float(robot.velocity_limit[index]))
             if self.mode == "buffer":
@@ -147,6 +154,15 @@ class JointLimits:
                 if math.isfinite(limit) or math.isfinite(speed)
             ]
         self.sides = tuple(sides)
+
+    def _inside(self, joint: str, limits: tuple[float, float]) -> tuple[float, float]:
+        lower, upper = limits[0] + self.clearance, limits[1] - self.clearance
+        if lower >= upper:
+            raise InputError(
+                f"joint limits: a clearance of {self.clearance:g} leaves no range to {joint!r}, "
+                f"which has {limits[0]:g} to {limits[1]:g}"
+            )
+        return lower, upper
 
     def margin(self, side: Side) -> float:
         """Width of the activation's rise on the acceleration, rad/s² or m/s²."""
@@ -169,6 +185,10 @@ class JointLimits:
         return min(
             -towards * slope + self.k2 * (allowed - towards), self.k2 * (side.speed - towards)
         )
+
+    def allowed_speed(self, side: Side, distance: float) -> float:
+        """Speed towards a limit from which the joint still stops at it, v_adm(d), rad/s or m/s."""
+        return self._allowed_speed(distance, side.brake)[0]
 
     def _allowed_speed(self, d: float, a: float) -> tuple[float, float]:
         if d < 0.0:
