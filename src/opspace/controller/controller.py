@@ -78,11 +78,17 @@ class Controller(ReferenceController):
                 return super().step(t, q, v)
             plan = self._plan = self._planned(members, axes)
         plan.refresh(robot, t)
+        observer = self._observer
+        if observer is not None:
+            observer.observe(t, v)
+            plan.disturb(observer.acceleration)
         answer = tick(t, plan.handle)
         if answer < 0:
             if answer == STATE_NOT_FINITE:
                 robot.check_state(q, v)
             return self._hold(t, timing | Status.FAULT)
+        if observer is not None:
+            observer.remember(t, v, plan.tick.joint_acceleration)
         found = plan.memory.copy()
         return Command(
             t,

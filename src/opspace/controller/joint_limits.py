@@ -35,13 +35,20 @@ class LimitTerms:
     margin: float
 
 
-def limit_terms(limits: JointLimits, positions: np.ndarray, v: np.ndarray) -> list[LimitTerms]:
+def limit_terms(
+    limits: JointLimits,
+    positions: np.ndarray,
+    v: np.ndarray,
+    disturbance: np.ndarray | None = None,
+) -> list[LimitTerms]:
     """Evaluate every limit at the present state.
 
     Args:
         limits: The limits, bound to the robot.
         positions: (n,) joint positions, rad.
         v: (n,) joint velocities, rad/s.
+        disturbance: (n,) accelerations that come on top of the commanded ones, rad/s²; None for
+            none. Mode ``buffer`` knows none.
 
     Returns:
         One entry per limit.
@@ -56,6 +63,8 @@ def limit_terms(limits: JointLimits, positions: np.ndarray, v: np.ndarray) -> li
             terms.append(LimitTerms(side.name, side.index, side.sign, command, h, 0.0))
         else:
             command = limits.admissible(side, position, speed)
+            if disturbance is not None:
+                command -= side.sign * float(disturbance[side.index])
             margin = limits.margin(side)
             terms.append(LimitTerms(side.name, side.index, side.sign, command, 0.0, margin))
     return terms

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from opspace.controller.bounds import keep_bounds
 from opspace.controller.command import Command, Found, Status
+from opspace.controller.disturbance import DisturbanceObserver
 from opspace.controller.joint_limits import (
     Insertion,
     insertions,
@@ -32,7 +33,7 @@ from opspace.law import (
 )
 from opspace.robots.protocol import Robot
 from opspace.stack import Blending, Member, Mixture, Stack, mixture
-from opspace.tasks import PostureTask, TaskTerms
+from opspace.tasks import JointLimits, PostureTask, TaskTerms
 
 BIASES = ("joint", "task")
 """``joint``: Γ = Γ_tasks + b + g, every joint compensated. ``task``: Eq. 3 as printed, the bias is
@@ -122,6 +123,7 @@ class ReferenceController:
         self.calibration = self._scales.calibration(list(stack))
         if stack.limits is not None:
             stack.limits.bind(robot, self.calibration.brake)
+        self._observer = _observer(stack.limits, robot.nv)
 
     @property
     def blending(self) -> str:
@@ -156,7 +158,7 @@ class ReferenceController:
         terms = [member.task.evaluate(robot, t) for member in members]
         mixed = mixture(members, activations, t, self._blending)
         task_sets, blend = self._task_sets(members, activations, terms, mixed)
-        tau, info, limits, kept = self._torque(task_sets, blend)
+        tau, info, limits, kept = self._torque(t, task_sets, blend)
         tau, status = self._checked(tau, limits)
         status |= timing | kept
         if any(level.scale < 1.0 - 1e-12 for level in info.levels):
@@ -215,7 +217,7 @@ class ReferenceController:
         return sets, [Weighted(w, present | {last}) for w, present in mixed.corners]
 
     def _torque(
-        self, tasks: list[TaskSet], blend: Sequence[Weighted]
+        self, t: float, tasks: list[TaskSet], blend: Sequence[Weighted]
     ) -> tuple[np.ndarray, LawInfo, dict[str, float], Status]:
         """The law (Eq. 19-23), with the joint limits that its own answer calls for."""
         L = np.linalg.cholesky(self.robot.M)
@@ -224,7 +226,10 @@ class ReferenceController:
         if limits is None:
             return tau, info, {}, Status.OK
         robot = self.robot
-        terms = limit_terms(limits, robot.q, robot.v)
+        observer = self._observer
+        if observer is not None:
+            observer.observe(t, robot.v)
+        terms = limit_terms(limits, robot.q, robot.v, observer and observer.acceleration)
         inserted: dict[str, Insertion] = {}
         for _ in range(LIMIT_PASSES):
             acceleration = self._acceleration(tau)
@@ -238,6 +243,8 @@ class ReferenceController:
         if limits.mode == "admissible":
             motors = robot.torque_limit if self.torque_limits == "priority" else None
             tau, kept = keep_bounds(terms, robot.M, robot.bias, tau, motors)
+        if observer is not None:
+            observer.remember(t, robot.v, self._acceleration(tau))
         return tau, info, {name: limit.activation for name, limit in inserted.items()}, kept
 
     def _law(
@@ -292,6 +299,8 @@ class ReferenceController:
 
     def _hold(self, t: float, status: Status) -> Command:
         """Brake in a tick that cannot be trusted."""
+        if self._observer is not None:
+            self._observer.forget_last()
         return Command(t, self._braking(), status, 0, Found({}, (), {}))
 
     def _braking(self) -> np.ndarray:
@@ -313,3 +322,9 @@ class ReferenceController:
         if limits:
             status |= Status.JOINT_LIMIT
         return tau, status
+
+
+def _observer(limits: JointLimits | None, n: int) -> DisturbanceObserver | None:
+    if limits is None or limits.observer_time is None or limits.mode != "admissible":
+        return None
+    return DisturbanceObserver(n, limits.observer_time)

@@ -175,6 +175,7 @@ def _joint_limits(scenario: Scenario) -> JointLimits | None:
         joints=option.joints,
         speeds=option.speeds,
         clearance=option.clearance,
+        observer_time=option.observer_time,
         brake_acceleration=option.brake_acceleration,
         profile=SWITCH if scenario.method == "switch" else option.profile,
     )

@@ -57,6 +57,10 @@ class JointLimits(Entry):
     clearance: Annotated[float, Quantity("rad or m", at_least=0.0)] = Field(
         default=0.0, description="how far inside its limits every joint is kept [rad or m]"
     )
+    observer_time: Annotated[float, Quantity("s", above=0.0)] | None = Field(
+        default=None,
+        description="time with which limits learn what the model does not explain [s]; null: never",
+    )
     speeds: dict[str, Annotated[float, Quantity("rad/s or m/s", above=0.0)]] = Field(
         default_factory=dict, description="joint: largest speed in place of the robot's own limit"
     )

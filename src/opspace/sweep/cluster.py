@@ -32,7 +32,7 @@ def run_on_ray(
         OpspaceError: There is no cluster at this address, or it has stopped answering.
     """
     try:
-        import ray  # noqa: PLC0415 - an extra, and slow to import
+        import ray  # noqa: PLC0415 # pyright: ignore[reportMissingImports] - an extra
     except ImportError:
         raise missing_extra("ray", "sweep") from None
     try:

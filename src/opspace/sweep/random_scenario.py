@@ -16,6 +16,8 @@ NEAR = 0.05
 """Width of the strip inside a joint limit where joints like to start, rad or m."""
 CLEARANCE = 0.02
 """What joints keep between themselves and their limits, because the model is wrong, rad or m."""
+OBSERVER_TIME = 0.01
+"""How fast joint limits learn what the model does not explain, s."""
 OUTSIDE = 0.15
 """How far outside its limits a joint may start, rad or m."""
 
@@ -59,7 +61,7 @@ def random_scenario(rng: np.random.Generator) -> dict[str, Any]:
         "blending": str(rng.choice(["auto", "chain", "idv"])),
         "tasks": tasks,
         "events": _events(rng, tasks, duration),
-        "joint_limits": {"clearance": CLEARANCE},
+        "joint_limits": {"clearance": CLEARANCE, "observer_time": OBSERVER_TIME},
         "plant": _plant(rng, robot, duration),
     }
 

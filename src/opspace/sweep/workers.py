@@ -23,7 +23,7 @@ THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_
 @dataclass
 class _Worker:
     process: BaseProcess
-    pipe: Connection
+    pipe: Any
     index: int | None = None
     since: float = 0.0
 

@@ -83,6 +83,10 @@ class JointLimits:
         clearance: How far inside its limits every joint is kept, rad or m. An acceleration that is wrong
             by δ, because masses or friction are, lets a joint rest δ/(k₁ k₂) beyond where it should.
         brake_acceleration: a, rad/s² or m/s²; None derives it per joint from the torque limits.
+        observer_time: Time with which the limits learn the acceleration δ that the model does not
+            explain, s: 0.01 lets them hold although masses are wrong by a fifth. q̈_adm then counts
+            without it. It takes a controller whose torques really go to the joints, tick by tick.
+            None trusts the model. Used in mode ``admissible``.
         profile: Name of the activation profile.
 
     Raises:
@@ -102,6 +106,7 @@ class JointLimits:
         joints: Mapping[str, Sequence[float]] | None = None,
         speeds: Mapping[str, float] | None = None,
         clearance: float = 0.0,
+        observer_time: float | None = None,
         brake_acceleration: float | None = None,
         profile: str = "quintic",
     ) -> None:
@@ -117,7 +122,10 @@ class JointLimits:
             )
         if not (math.isfinite(clearance) and clearance >= 0.0):
             raise InputError(f"joint limits: clearance must be at least 0, got {clearance}")
+        if observer_time is not None and not (math.isfinite(observer_time) and observer_time > 0.0):
+            raise InputError(f"joint limits: observer_time must be above 0 s, got {observer_time}")
         self.buffer = float(buffer)
+        self.observer_time = observer_time
         self.clearance = float(clearance)
         self.mode = mode
         self.profile = profile

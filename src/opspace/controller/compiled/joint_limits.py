@@ -28,7 +28,7 @@ FILTERED = int(Status.FILTERED)
 LIMIT_LOST = int(Status.LIMIT_LOST)
 
 # Columns of Tick.limit.
-SIGN, POSITION, BRAKE, MARGIN, COMMAND, SPEED = range(6)
+SIGN, POSITION, BRAKE, MARGIN, COMMAND, SPEED, DISTURBANCE = range(7)
 
 
 @jit
@@ -48,7 +48,7 @@ def begin_limits(k):
             allowed, slope = _allowed_speed(k.option, distance, limit[BRAKE])
             k2 = k.option[LIMIT_K2]
             stopping = -towards * slope + k2 * (allowed - towards)
-            limit[COMMAND] = min(stopping, k2 * (limit[SPEED] - towards))
+            limit[COMMAND] = min(stopping, k2 * (limit[SPEED] - towards)) - limit[DISTURBANCE]
 
 
 @jit

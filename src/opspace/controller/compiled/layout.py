@@ -93,8 +93,8 @@ class Tick(NamedTuple):
     ``slots`` (slots, 3: depth, first row, rows) in the order of the levels,
     ``slot_on`` and ``slot_off``: variables that must be on or off for a task to be there,
     ``slot_place``: those of them that choose its place; ``own``: activation of each task by its
-    own function; ``limit_joint`` and ``limit`` (limits, 6: side, position, braking acceleration,
-    margin) of joint limits; ``torque_limit``; ``option``.
+    own function; ``limit_joint`` and ``limit`` (limits, 7: side, position, braking acceleration,
+    margin, what it asks for, largest speed, disturbance) of joint limits; ``torque_limit``; ``option``.
 
     What it writes, all in one block of memory: ``tau``, ``h`` of each task, ``share`` of each slot,
     ``error`` and ``wanted`` of each row, ``limit_h``, ``limit_wanted``, ``scale`` of each level (joint

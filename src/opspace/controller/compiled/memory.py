@@ -147,7 +147,7 @@ def make_tick(
         slot_place=np.zeros(size.slots, integers),
         own=np.ones(size.tasks),
         limit_joint=np.zeros(size.limits, integers),
-        limit=np.zeros((size.limits, 6)),
+        limit=np.zeros((size.limits, 7)),
         torque_limit=limit,
         L=L,
         option=option,

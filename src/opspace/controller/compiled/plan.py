@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from opspace.controller.compiled.joint_limits import DISTURBANCE, SIGN, SPEED
 from opspace.controller.compiled.layout import (
     ADMISSIBLE,
     BUFFER,
@@ -105,6 +106,11 @@ class Plan:
         for packed in self.packed:
             packed.refresh(robot, t)
 
+    def disturb(self, acceleration: np.ndarray) -> None:
+        """Tell the joint limits what comes on top of the commanded accelerations, (n,) rad/s²."""
+        tick = self.tick
+        tick.limit[:, DISTURBANCE] = tick.limit[:, SIGN] * acceleration[tick.limit_joint]
+
     def go_on_from(self, before: Plan) -> None:
         """Keep what the plan before remembers: groups of the blend, turns of rotations."""
         groups = dict(zip(map(id, before.variables), before.tick.group.tolist(), strict=True))
@@ -173,7 +179,14 @@ def _arrivals(members: Sequence[Member]) -> list[Variable]:
 def _pack_limits(limits: JointLimits, scales: Scales, tick: Tick) -> None:
     for i, side in enumerate(limits.sides):
         tick.limit_joint[i] = side.index
-        tick.limit[i] = side.sign, side.limit, side.brake, limits.margin(side), 0.0, side.speed
+        tick.limit[i, : SPEED + 1] = (
+            side.sign,
+            side.limit,
+            side.brake,
+            limits.margin(side),
+            0.0,
+            side.speed,
+        )
     option = tick.option
     option[LIMIT_MODE] = BUFFER if limits.mode == "buffer" else ADMISSIBLE
     option[LIMIT_PROFILE] = PROFILE_CODE[limits.profile]
