@@ -123,7 +123,7 @@ class ReferenceController:
         self.calibration = self._scales.calibration(list(stack))
         if stack.limits is not None:
             stack.limits.bind(robot, self.calibration.brake)
-        self._observer = _observer(stack.limits, robot.nv)
+        self._observer = _observer(stack.limits, robot.nv, torque_limits)
 
     @property
     def blending(self) -> str:
@@ -324,7 +324,12 @@ class ReferenceController:
         return tau, status
 
 
-def _observer(limits: JointLimits | None, n: int) -> DisturbanceObserver | None:
+def _observer(limits: JointLimits | None, n: int, torque_limits: str) -> DisturbanceObserver | None:
     if limits is None or limits.observer_time is None or limits.mode != "admissible":
         return None
+    if torque_limits != "priority":
+        raise InputError(
+            "joint limits with an observer_time need torque_limits='priority': "
+            "what the motors clip would be taken for a disturbance"
+        )
     return DisturbanceObserver(n, limits.observer_time)
