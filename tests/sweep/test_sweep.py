@@ -194,6 +194,7 @@ def test_killed_at_random_moments_a_sweep_loses_and_repeats_nothing(tmp_path):
         assert rows[index] == json.loads(json.dumps(run_row(plan, index)))
 
 
+@pytest.mark.slow
 def test_on_a_cluster_of_two_nodes_rows_are_identical(tmp_path):
     ray = pytest.importorskip("ray", reason="ray is not installed")
     cluster_utils = pytest.importorskip("ray.cluster_utils")
