@@ -5,12 +5,16 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from opspace.errors import InputError, unknown_name
 from opspace.robots.description import Description
 from opspace.robots.motion_axes import MotionAxes
+
+if TYPE_CHECKING:
+    from opspace.robots.rigid_model import RigidModel
 
 
 class AdapterBase(ABC):
@@ -164,6 +168,10 @@ class AdapterBase(ABC):
     @abstractmethod
     def motion_axes(self) -> MotionAxes | None:
         """Return the arrays that compiled code reads, or None if a joint has several coordinates."""
+
+    @abstractmethod
+    def rigid_model(self) -> RigidModel | None:
+        """Return the bodies as numbers, or None if there is a joint that they cannot describe."""
 
     @abstractmethod
     def integrate(self, q: np.ndarray, v: np.ndarray, dt: float) -> np.ndarray:

@@ -11,6 +11,8 @@ import numpy as np
 from opspace.robots.base import AdapterBase
 from opspace.robots.description import Description
 from opspace.robots.motion_axes import FramePlace, MassPoint, MotionAxes
+from opspace.robots.pinocchio_model import frame_ids, model_from_mujoco
+from opspace.robots.rigid_model import RigidModel, rigid_model
 from opspace.robots.world_axes import placements, world_axes
 
 
@@ -98,6 +100,11 @@ class MujocoRobot(AdapterBase):
                 for b in self._massive
             ),
         )
+
+    def rigid_model(self) -> RigidModel | None:
+        """Return the bodies as numbers; they are those of the same model in Pinocchio."""
+        model = model_from_mujoco(self._model)
+        return rigid_model(model, frame_ids(model, self.description))
 
     def _last_dof(self, body: int) -> int:
         """Return the last joint coordinate that moves a body, −1 for none."""
