@@ -14,7 +14,10 @@ SOURCES = [
     path
     for part in ("law", "controller")
     for path in sorted((Path(__file__).parents[2] / part / "compiled").glob("*.py"))
-] + [Path(__file__).parents[1] / "saturation.py"]
+] + [
+    Path(__file__).parents[1] / "saturation.py",
+    Path(__file__).parents[2] / "robots" / "dynamics.py",
+]
 
 FAST = {"reassoc", "contract"}
 """Sums may be taken in another order, four at a time; inf and nan stay what they are."""
@@ -29,13 +32,17 @@ def _stamp() -> tuple[float, int]:
 STAMP = _stamp()
 
 
-def jit(function: Callable[..., Any]) -> Any:
+def jit(function: Callable[..., Any], *, nogil: bool = False) -> Any:
     """Compile a function at first use and keep it on disk; a division by zero gives inf or nan.
 
     What is kept counts as old when any compiled source has changed: by itself numba looks at the
     file of the function alone, not at those of the functions that it calls.
+
+    Args:
+        function: The function.
+        nogil: Whether other threads of Python may run while it does.
     """
-    compiled: Any = numba.njit(cache=True, error_model="numpy", fastmath={"reassoc", "contract"})(
+    compiled: Any = numba.njit(cache=True, nogil=nogil, error_model="numpy", fastmath=FAST)(
         function
     )
     compiled._cache._cache_file._source_stamp = STAMP
