@@ -15,8 +15,9 @@ from opspace.controller.compiled.layout import OWN, REMEMBERS, TURN
 from opspace.controller.compiled.packing import kind_of, own_activation
 from opspace.controller.compiled.plan import Plan
 from opspace.errors import InputError
+from opspace.law.compiled.handle import Handle
 from opspace.robots.base import AdapterBase
-from opspace.robots.dynamics import Dynamics, make_dynamics
+from opspace.robots.dynamics import make_dynamics
 from opspace.robots.motion_axes import MotionAxes
 from opspace.robots.rigid_model import RigidModel
 from opspace.stack import Member
@@ -57,9 +58,10 @@ class Batch:
         self.members = members
         self.threads = threads
         self.robot = robot
-        self._bodies = model.bodies
-        self._dynamics = [make_dynamics(model.bodies) for _ in range(threads)]
-        self._plans = [planned(members, model.motion_axes(d)) for d in self._dynamics]
+        self._bodies = Handle("RigidBodies", model.bodies._asdict())
+        dynamics = [make_dynamics(model.bodies) for _ in range(threads)]
+        self._plans = [planned(members, model.motion_axes(d)) for d in dynamics]
+        self._dynamics = [Handle("Dynamics", d._asdict()) for d in dynamics]
         self._pool = ThreadPoolExecutor(threads) if threads > 1 else None
 
     def torque(self, Q: np.ndarray, V: np.ndarray, t: float, before: Plan | None) -> np.ndarray:
@@ -84,7 +86,7 @@ class Batch:
         tau = np.zeros(Q.shape)
         chunks = iter(range(0, len(Q), CHUNK))
 
-        def work(plan: Plan, dynamics: Dynamics) -> None:
+        def work(plan: Plan, dynamics: Handle) -> None:
             for first in chunks:  # the next one that nobody has taken
                 end = min(first + CHUNK, len(Q))
                 ticks(
@@ -188,15 +190,16 @@ def check_members(members: tuple[Member, ...]) -> None:
             )
 
 
-def _remembered(plan: Plan, before: Plan | None) -> Remembered:
+def _remembered(plan: Plan, before: Plan | None) -> Handle:
     """Return what the plan before leaves to this one."""
     tick = plan.tick
     tick.group[:] = 0
     tick.kind[:, REMEMBERS] = 0
     if before is not None:
         plan.go_on_from(before)
-    return Remembered(
+    found = Remembered(
         group=tick.group.copy(),
         remembers=tick.kind[:, REMEMBERS].copy(),
         turn=tick.numbers[:, TURN : TURN + 4].copy(),
     )
+    return Handle("Remembered", found._asdict())

@@ -37,9 +37,9 @@ def ticks(t, k, bodies, dynamics, before, Q, V, own, first, end, tau):
     Args:
         t: Time, s.
         k: Handle of a `opspace.controller.compiled.layout.Tick` whose robot is ``dynamics``.
-        bodies: `opspace.robots.dynamics.RigidBodies`.
-        dynamics: `opspace.robots.dynamics.Dynamics`.
-        before: `Remembered`.
+        bodies: Handle of `opspace.robots.dynamics.RigidBodies`.
+        dynamics: Handle of `opspace.robots.dynamics.Dynamics`.
+        before: Handle of `Remembered`.
         Q: (states, n) configurations.
         V: (states, n) velocities.
         own: (states, tasks) activation of each task by its own function, or one row for all.

@@ -15,6 +15,7 @@ from opspace.controller.compiled.layout import OPTION_SIZE, Tick, tick_handle
 from opspace.controller.compiled.memory import Sizes, make_tick
 from opspace.controller.compiled.report import spectrum
 from opspace.controller.compiled.tick import tick
+from opspace.law.compiled.handle import Handle
 from opspace.law.compiled.space import space_handle
 from opspace.robots.dynamics import ALIGNED, RigidBodies, make_dynamics
 from opspace.robots.motion_axes import MotionAxes
@@ -58,7 +59,9 @@ def compiled_batch() -> float:
         k = tick_handle(*_smallest(model.motion_axes(dynamics)))
         before = Remembered(np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros((0, 4)))
         state = np.zeros((1, 1))
-        ticks(0.0, k, bodies, dynamics, before, state, state, np.ones((1, 0)), 0, 1, state.copy())
+        given = (Handle("RigidBodies", bodies._asdict()), Handle("Dynamics", dynamics._asdict()))
+        start = Handle("Remembered", before._asdict())
+        ticks(0.0, k, *given, start, state, state, np.ones((1, 0)), 0, 1, state.copy())
 
     return _announced("the control tick for many states", ticks, call)
 
@@ -121,7 +124,7 @@ def _one_body() -> RigidBodies:
     )
 
 
-def _smallest(axes: MotionAxes) -> tuple[Tick, object]:
+def _smallest(axes: MotionAxes) -> tuple[Tick, Handle]:
     """Make the arrays of a tick for one joint and no task."""
     size = Sizes(n=1, tasks=0, rows=0, slots=0, levels=0, variables=0, limits=0, corners=1)
     memory, space, _ = make_tick(size, axes, np.ones(1), np.zeros(OPTION_SIZE))
