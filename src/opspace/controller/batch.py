@@ -58,10 +58,7 @@ class Batch:
         self.members = members
         self.threads = threads
         self.robot = robot
-        self._bodies = Handle("RigidBodies", model.bodies._asdict())
-        dynamics = [make_dynamics(model.bodies) for _ in range(threads)]
-        self._plans = [planned(members, model.motion_axes(d)) for d in dynamics]
-        self._dynamics = [Handle("Dynamics", d._asdict()) for d in dynamics]
+        self._plans = [planned(members, _axes(model)) for _ in range(threads)]
         self._pool = ThreadPoolExecutor(threads) if threads > 1 else None
 
     def torque(self, Q: np.ndarray, V: np.ndarray, t: float, before: Plan | None) -> np.ndarray:
@@ -86,17 +83,15 @@ class Batch:
         tau = np.zeros(Q.shape)
         chunks = iter(range(0, len(Q), CHUNK))
 
-        def work(plan: Plan, dynamics: Handle) -> None:
+        def work(plan: Plan) -> None:
             for first in chunks:  # the next one that nobody has taken
                 end = min(first + CHUNK, len(Q))
-                ticks(
-                    t, plan.handle, self._bodies, dynamics, remembered, Q, V, own, first, end, tau
-                )  # fmt: skip
+                ticks(t, plan.handle, remembered, Q, V, own, first, end, tau)
 
         if self._pool is None or len(Q) <= CHUNK:
-            work(self._plans[0], self._dynamics[0])
+            work(self._plans[0])
         else:
-            list(self._pool.map(work, self._plans, self._dynamics))
+            list(self._pool.map(work, self._plans))
         return tau
 
     def _own_activations(self, Q: np.ndarray, V: np.ndarray, t: float) -> np.ndarray:
@@ -112,6 +107,11 @@ class Batch:
             for i in chosen:
                 row[i] = own_activation(self.members[i].task, robot, t)
         return own
+
+
+def _axes(model: RigidModel) -> MotionAxes:
+    n = model.bodies.before.size
+    return model.motion_axes(make_dynamics(model.bodies), np.zeros(n), np.zeros(n))
 
 
 def cores() -> int:

@@ -30,11 +30,13 @@ from opspace.controller.tick import ReferenceController
 from opspace.errors import InputError
 from opspace.law.compiled.profiles import PROFILE_CODE
 from opspace.robots.base import AdapterBase
+from opspace.robots.dynamics import make_dynamics
 from opspace.robots.motion_axes import MotionAxes
 from opspace.robots.rigid_model import RigidModel
 from opspace.stack import Member
 
 STATUSES = tuple(Status(bits) for bits in range(256))
+TIME_JUMP, FAULT = int(Status.TIME_JUMP), int(Status.FAULT)
 
 
 class Controller(ReferenceController):
@@ -69,12 +71,14 @@ class Controller(ReferenceController):
         if q.shape != axes.q.shape or v.shape != axes.v.shape:
             robot.check_state(q, v)
         robot.place(q, v)
-        timing = Status.OK
+        if self._bodies is None:
+            robot.catch_up()
+        timing = 0  # a number: the operators of flags cost as much as all of Python here
         if self._timing is not None:
             robot.check_state(q, v)
-            timing = self._timing.check(t, q, v)
-            if timing & Status.TIME_JUMP and self._holds:
-                return self._hold(t, timing)
+            timing = int(self._timing.check(t, q, v))
+            if timing & TIME_JUMP and self._holds:
+                return self._hold(t, STATUSES[timing])
         members = self.stack.begin_tick(t)
         plan = self._plan
         if plan is None or members is not plan.members:
@@ -86,7 +90,7 @@ class Controller(ReferenceController):
         if answer < 0:
             if answer == STATE_NOT_FINITE:
                 robot.check_state(q, v)
-            return self._hold(t, timing | Status.FAULT)
+            return self._hold(t, STATUSES[timing | FAULT])
         found = plan.memory.copy()
         return Command(
             t,
@@ -157,8 +161,15 @@ class Controller(ReferenceController):
         return 0.0 if axes is None else compiled_tick()
 
     def _compiled_robot(self) -> MotionAxes | None:
+        """Give the robot's arrays: computed by compiled code where it can, else by its library."""
         robot = self.robot
-        return robot.motion_axes() if isinstance(robot, AdapterBase) else None
+        axes = robot.motion_axes() if isinstance(robot, AdapterBase) else None
+        if axes is None or not isinstance(robot, AdapterBase):
+            return None
+        model = self._bodies = robot.rigid_model()
+        if model is None:
+            return axes
+        return model.motion_axes(make_dynamics(model.bodies), *robot.state)
 
     def _batched(self, members: tuple[Member, ...], threads: int) -> Batch:
         robot = self.robot

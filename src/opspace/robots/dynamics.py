@@ -91,11 +91,33 @@ class Dynamics(NamedTuple):
     step: np.ndarray
 
 
+def no_bodies() -> RigidBodies:
+    """Give a tree without bodies, of a robot that somebody else computes."""
+    numbers, integers = np.zeros(0), np.zeros(0, np.int64)
+    table = np.zeros((0, 12))
+    return RigidBodies(
+        kind=integers,
+        parent=integers,
+        place=table,
+        axis=table[:, :3].copy(),
+        along=integers,
+        first_q=integers,
+        first_v=integers,
+        width=integers,
+        mass=numbers,
+        centre=table[:, :3].copy(),
+        tensor=table[:, :6].copy(),
+        before=integers,
+        armature=numbers,
+        gravity=np.zeros(3),
+    )
+
+
 def make_dynamics(bodies: RigidBodies) -> Dynamics:
     """Make the memory for the dynamics of a tree."""
     n, count = bodies.before.size, bodies.kind.size
     placement = np.zeros((count, 12))
-    placement[0, [0, 4, 8]] = 1.0
+    placement[:1, [0, 4, 8]] = 1.0
     return Dynamics(
         M=np.zeros((n, n)),
         bias=np.zeros(n),

@@ -61,11 +61,13 @@ class MujocoRobot(AdapterBase):
     @property
     def M(self) -> np.ndarray:
         """Return the joint-space inertia, (nv, nv), armature included."""
+        self.catch_up()
         return self._M_view
 
     @property
     def bias(self) -> np.ndarray:
         """Return b + g, (nv,) N·m. Friction is not part of it."""
+        self.catch_up()
         return self._bias_view
 
     def fresh(self) -> MujocoRobot:

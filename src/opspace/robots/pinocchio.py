@@ -54,11 +54,13 @@ class PinocchioRobot(AdapterBase):
     @property
     def M(self) -> np.ndarray:
         """Return the joint-space inertia, (nv, nv), armature included."""
+        self.catch_up()
         return self._M
 
     @property
     def bias(self) -> np.ndarray:
         """Return b + g, (nv,) N·m. Friction is not part of it."""
+        self.catch_up()
         return self._bias
 
     def fresh(self) -> PinocchioRobot:

@@ -38,15 +38,17 @@ class RigidModel:
     frames: Mapping[int, FramePlace]
     masses: tuple[MassPoint, ...]
 
-    def motion_axes(self, dynamics: Dynamics) -> MotionAxes:
-        """Return the arrays that compiled code reads, with those of ``dynamics`` among them.
+    def motion_axes(self, dynamics: Dynamics, q: np.ndarray, v: np.ndarray) -> MotionAxes:
+        """Return the arrays that compiled code reads of a robot that it computes itself.
 
-        For robots whose joints all have one degree of freedom.
+        Args:
+            dynamics: Where it does.
+            q: (n,) the configuration that it reads.
+            v: (n,) the velocity.
         """
-        n = self.bodies.before.size
         return MotionAxes(
-            q=np.zeros(n),
-            v=np.zeros(n),
+            q=q,
+            v=v,
             M=dynamics.M,
             bias=dynamics.bias,
             axes=dynamics.axes,
@@ -54,6 +56,8 @@ class RigidModel:
             parent=self.bodies.before,
             frames=self.frames,
             masses=self.masses,
+            bodies=self.bodies,
+            dynamics=dynamics,
         )
 
 

@@ -1,4 +1,4 @@
-"""The compiled tick at many states, with dynamics of our own."""
+"""The compiled tick at many states."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ import numpy as np
 from opspace.controller.compiled.layout import DAMPING, REMEMBERS, TURN
 from opspace.controller.compiled.tick import tick
 from opspace.law.compiled.jit import jit
-from opspace.robots.dynamics import evaluate
 
 LARGEST = float(np.finfo(float).max)
 
@@ -31,14 +30,12 @@ class Remembered(NamedTuple):
 
 
 @partial(jit, nogil=True)
-def ticks(t, k, bodies, dynamics, before, Q, V, own, first, end, tau):
+def ticks(t, k, before, Q, V, own, first, end, tau):
     """Compute the torque at the states ``first`` to ``end`` − 1, each as the tick after ``before``.
 
     Args:
         t: Time, s.
-        k: Handle of a `opspace.controller.compiled.layout.Tick` whose robot is ``dynamics``.
-        bodies: Handle of `opspace.robots.dynamics.RigidBodies`.
-        dynamics: Handle of `opspace.robots.dynamics.Dynamics`.
+        k: Handle of a `opspace.controller.compiled.layout.Tick` that computes the robot itself.
         before: Handle of `Remembered`.
         Q: (states, n) configurations.
         V: (states, n) velocities.
@@ -52,7 +49,6 @@ def ticks(t, k, bodies, dynamics, before, Q, V, own, first, end, tau):
         for a in range(n):
             k.q[a], k.v[a] = Q[i, a], V[i, a]
         begin_state(k, before, own[i if own.shape[0] > 1 else 0])
-        evaluate(bodies, k.q, k.v, dynamics)
         if tick(t, k) < 0:
             brake(k, tau[i])
         else:

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from opspace.law.compiled.handle import Handle
+from opspace.robots.motion_axes import MotionAxes
 
 # Kinds of tasks.
 OWN, MOTION, JOINTS = range(3)
@@ -163,6 +164,8 @@ class Tick(NamedTuple):
     joint_acceleration: np.ndarray
 
 
-def tick_handle(t: Tick, space: Handle) -> Handle:
-    """Make the handle with which compiled functions reach a `Tick` and the memory of its walk."""
-    return Handle("Tick", {**t._asdict(), "space": space})
+def tick_handle(t: Tick, space: Handle, axes: MotionAxes) -> Handle:
+    """Make the handle with which compiled functions reach a `Tick`, its walk, and the robot."""
+    bodies = Handle("RigidBodies", axes.bodies._asdict())
+    dynamics = Handle("Dynamics", axes.dynamics._asdict())
+    return Handle("Tick", {**t._asdict(), "space": space, "bodies": bodies, "dynamics": dynamics})

@@ -54,14 +54,14 @@ def compiled_batch() -> float:
 
     def call() -> None:
         bodies = _one_body()
-        dynamics = make_dynamics(bodies)
-        model = RigidModel(bodies, {}, ())
-        k = tick_handle(*_smallest(model.motion_axes(dynamics)))
-        before = Remembered(np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros((0, 4)))
         state = np.zeros((1, 1))
-        given = (Handle("RigidBodies", bodies._asdict()), Handle("Dynamics", dynamics._asdict()))
+        axes = RigidModel(bodies, {}, ()).motion_axes(
+            make_dynamics(bodies), np.zeros(1), np.zeros(1)
+        )
+        before = Remembered(np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros((0, 4)))
         start = Handle("Remembered", before._asdict())
-        ticks(0.0, k, *given, start, state, state, np.ones((1, 0)), 0, 1, state.copy())
+        k = tick_handle(*_smallest(axes))
+        ticks(0.0, k, start, state, state, np.ones((1, 0)), 0, 1, state.copy())
 
     return _announced("the control tick for many states", ticks, call)
 
@@ -124,8 +124,8 @@ def _one_body() -> RigidBodies:
     )
 
 
-def _smallest(axes: MotionAxes) -> tuple[Tick, Handle]:
+def _smallest(axes: MotionAxes) -> tuple[Tick, Handle, MotionAxes]:
     """Make the arrays of a tick for one joint and no task."""
     size = Sizes(n=1, tasks=0, rows=0, slots=0, levels=0, variables=0, limits=0, corners=1)
     memory, space, _ = make_tick(size, axes, np.ones(1), np.zeros(OPTION_SIZE))
-    return memory, space_handle(space)
+    return memory, space_handle(space), axes
