@@ -59,7 +59,6 @@ class Batch:
         self.threads = threads
         self.robot = robot
         self._plans = [planned(members, _axes(model)) for _ in range(threads)]
-        self._pool = ThreadPoolExecutor(threads) if threads > 1 else None
 
     def torque(self, Q: np.ndarray, V: np.ndarray, t: float, before: Plan | None) -> np.ndarray:
         """Compute the torque at every state.
@@ -88,10 +87,12 @@ class Batch:
                 end = min(first + CHUNK, len(Q))
                 ticks(t, plan.handle, remembered, Q, V, own, first, end, tau)
 
-        if self._pool is None or len(Q) <= CHUNK:
-            work(self._plans[0])
+        used = self._plans[: max(1, -(-len(Q) // CHUNK))]
+        if len(used) == 1:
+            work(used[0])
         else:
-            list(self._pool.map(work, self._plans))
+            with ThreadPoolExecutor(len(used)) as pool:  # a kept one would not live in a fork
+                list(pool.map(work, used))
         return tau
 
     def _own_activations(self, Q: np.ndarray, V: np.ndarray, t: float) -> np.ndarray:
