@@ -1,7 +1,8 @@
 """The show-piece on motors that are too weak: levels that give way against a clip.
 
 The motors get what gravity takes anywhere in the workspace plus a part of what the tasks take at most
-in the show-piece, both joint by joint. ``python docs/evidence/torque_limits.py`` writes the table of docs/safety.md.
+in the show-piece, both joint by joint. ``python docs/evidence/torque_limits.py`` writes the table of
+docs/safety.md.
 """
 
 import re

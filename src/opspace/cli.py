@@ -244,8 +244,8 @@ def bench(
     scenes: Annotated[
         list[str] | None, typer.Argument(help="Names of scenes. [default: all]", metavar="SCENE")
     ] = None,
-    ticks: Annotated[int, typer.Option(help="Ticks of every subject.")] = 4000,
-    core: Annotated[int | None, typer.Option(help="Stay on this core.")] = None,
+    ticks: Annotated[int, typer.Option(help="Ticks of every subject; states of a batch.")] = 4000,
+    core: Annotated[int | None, typer.Option(help="Stay on this core for single ticks.")] = None,
     readable: Annotated[
         bool, typer.Option("--readable", help="Time the readable form of the tick as well.")
     ] = False,
@@ -255,17 +255,19 @@ def bench(
     out: Annotated[Path, typer.Option(help="Directory to write to.")] = Path("results/bench"),
 ) -> None:
     """Time the tick, in turns with the model's own calls and with other controllers."""
-    from opspace.bench import SCENES, Benchmark, compare_runs, run_benchmark
+    from opspace.bench import Benchmark, compare_runs, run_benchmark
     from opspace.plots import save
     from opspace.plots.benchmark import benchmark_figure
 
     before = None if against is None else Benchmark.load(against)
 
-    def announce(name: str) -> None:
-        print(f"{name}: {SCENES[name].title}", file=sys.stderr)
+    def announce(what: str) -> None:
+        print(what, file=sys.stderr)
 
     found = run_benchmark(scenes or (), ticks, core, readable=readable, announce=announce)
     _print_table(*found.table())
+    print()
+    _print_table(*found.batch_table())
     if before is not None:
         print()
         _print_table(*compare_runs(before, found))

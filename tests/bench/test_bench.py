@@ -5,6 +5,7 @@ import pytest
 
 from opspace.bench import SCENES, Benchmark, compare_runs, run_benchmark
 from opspace.bench.timing import interleaved
+from opspace.controller.batch import cores
 from opspace.errors import InputError, UnknownNameError
 from opspace.plots.benchmark import benchmark_figure
 from opspace.robots import available_robots
@@ -16,7 +17,7 @@ def test_a_scene_is_timed_beside_the_models_own_calls(tmp_path):
     told = []
     found = run_benchmark(["puma"], ticks=40, readable=True, announce=told.append)
     times = found.scenes["puma"]
-    assert told == ["puma"]
+    assert [what.split(":")[0] for what in told] == ["puma", "puma, many states at once"]
     assert set(times) == {"opspace", "model calls alone", "readable form"}
     for subject in times.values():
         assert 0.0 < subject["p50"] <= subject["p99"] <= subject["max"]
@@ -25,6 +26,9 @@ def test_a_scene_is_timed_beside_the_models_own_calls(tmp_path):
         times["opspace"]["p50"] / times["model calls alone"]["p50"]
     )
     assert found.ratio("puma", "opspace", "placo") is None
+    assert set(found.batches["puma"]) == {"1", str(cores())}
+    assert all(rate > 0.0 for rate in found.batches["puma"].values())
+    assert len(found.batch_table()[1]) == len(found.batches["puma"])
     found.save(tmp_path / "a" / "bench.json")
     again = Benchmark.load(tmp_path / "a" / "bench.json")
     assert again == found

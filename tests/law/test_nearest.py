@@ -7,6 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from opspace.law import excess, nearest_acceleration
+from opspace.law.compiled.nearest import bounds_handle, make_bounds
 from opspace.law.compiled.nearest import nearest_acceleration as compiled
 
 INF = np.inf
@@ -75,7 +76,10 @@ def test_it_is_the_nearest_in_the_inertia_metric(seed):
 def test_compiled_is_readable(seed, contradictory):
     L, start, *bounds = problem(seed, contradictory)
     x = start.copy()
-    compiled(L, x, *bounds)
+    given_ = make_bounds(x.size)
+    for array, values in zip(given_, bounds, strict=False):
+        array[:] = values
+    compiled(L, x, bounds_handle(given_))
     readable = nearest_acceleration(L, start, *bounds)
     assert np.allclose(x, readable, rtol=1e-6, atol=1e-5)
 

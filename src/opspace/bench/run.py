@@ -11,12 +11,14 @@ from pathlib import Path
 
 import numpy as np
 
+from opspace.bench.batch import states_per_second
 from opspace.bench.scenes import SCENES
 from opspace.bench.subjects import LIBRARY, MODEL, PLACO, subjects
 from opspace.bench.timing import interleaved, pinned
 from opspace.errors import InputError, unknown_name
 
 PACKAGES = ("opspace", "numba", "numpy", "pin", "mujoco", "placo")
+BATCH_HEADS = ("scene", "threads", "states/s", "µs a state")
 HEADS = ("scene", "subject", "p50 [µs]", "p99 [µs]", "max [µs]", "of placo", "of model calls")
 
 
@@ -27,10 +29,12 @@ class Benchmark:
     Attributes:
         scenes: By scene and subject: ``p50``, ``p99``, ``p999``, ``max``, ``mean`` in µs, ``ticks``.
         machine: What it was measured on.
+        batches: By scene and number of threads: states per second of `Controller.torque_batch`.
     """
 
     scenes: dict[str, dict[str, dict[str, float]]] = field(default_factory=dict)
     machine: dict[str, str] = field(default_factory=dict)
+    batches: dict[str, dict[str, float]] = field(default_factory=dict)
 
     def ratio(self, scene: str, subject: str, to: str) -> float | None:
         """Median of a subject over that of another one in the same scene, None where it is not."""
@@ -53,10 +57,19 @@ class Benchmark:
                 )
         return HEADS, rows
 
+    def batch_table(self) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+        """Heads and rows of the batches for a person."""
+        rows = [
+            (scene, threads, f"{rate:,.0f}", f"{1e6 / rate:.3g}")
+            for scene, found in self.batches.items()
+            for threads, rate in found.items()
+        ]
+        return BATCH_HEADS, rows
+
     def save(self, path: Path) -> None:
         """Write it as JSON."""
         path.parent.mkdir(parents=True, exist_ok=True)
-        content = {"machine": self.machine, "scenes": self.scenes}
+        content = {"machine": self.machine, "scenes": self.scenes, "batches": self.batches}
         path.write_text(json.dumps(content, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
 
     @staticmethod
@@ -68,7 +81,7 @@ class Benchmark:
         """
         try:
             content = json.loads(path.read_text(encoding="utf-8"))
-            return Benchmark(content["scenes"], content["machine"])
+            return Benchmark(content["scenes"], content["machine"], content.get("batches", {}))
         except (OSError, ValueError, KeyError, TypeError) as error:
             raise InputError(f"{path}: not a benchmark of opspace: {error}") from None
 
@@ -85,10 +98,10 @@ def run_benchmark(
 
     Args:
         names: Scenes; none is all of them whose robot is installed.
-        ticks: Ticks of every subject.
-        core: Core to stay on; None leaves it to the system.
+        ticks: Ticks of every subject, and states of a batch.
+        core: Core to stay on for single ticks; None leaves it to the system.
         readable: Time the readable form of the tick as well.
-        announce: Told the name of every scene before it is timed.
+        announce: Told what is timed next.
 
     Returns:
         What was measured.
@@ -106,12 +119,15 @@ def run_benchmark(
     found = Benchmark(machine=_machine(core))
     with pinned(core):
         for name in names or SCENES:
-            announce(name)
+            announce(f"{name}: {SCENES[name].title}")
             scene = SCENES[name]
             timed = subjects(scene, readable)
             q, v = scene.states(scene.robot())
             times = interleaved(timed, q, v, ticks)
             found.scenes[name] = {subject: _summary(x) for subject, x in times.items()}
+    for name in names or SCENES:
+        announce(f"{name}, many states at once")
+        found.batches[name] = states_per_second(SCENES[name], ticks)
     return found
 
 

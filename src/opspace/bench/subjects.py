@@ -11,6 +11,7 @@ import numpy as np
 from opspace.bench.scenes import Scene
 from opspace.controller import ReferenceController
 from opspace.controller.compiled.warm_up import compiled_tick
+from opspace.robots.base import AdapterBase
 from opspace.robots.protocol import Robot
 from opspace.tasks import OrientationTask, PoseTask, PositionTask, PostureTask
 
@@ -35,7 +36,7 @@ def subjects(scene: Scene, readable: bool = False) -> dict[str, Tick]:
     t = scene.time
     found[LIBRARY] = lambda q, v: controller.step(t, q, v)
     robot = scene.robot()
-    found[MODEL] = robot.place  # pyright: ignore[reportAttributeAccessIssue]
+    found[MODEL] = _model_calls(robot)
     if readable:
         slow = scene.controller(ReferenceController)
         found[READABLE] = lambda q, v: slow.step(t, q, v)
@@ -43,6 +44,17 @@ def subjects(scene: Scene, readable: bool = False) -> dict[str, Tick]:
     if scene.peers and urdf and importlib.util.find_spec("placo") is not None:
         found[PLACO] = placo_tick(scene)
     return found
+
+
+def _model_calls(robot: Robot) -> Tick:
+    """Put the state to the robot's own library, which the controller does not need to do."""
+    assert isinstance(robot, AdapterBase)
+
+    def tick(q: np.ndarray, v: np.ndarray) -> None:
+        robot.place(q, v)
+        robot.catch_up()
+
+    return tick
 
 
 def placo_tick(scene: Scene) -> Tick:

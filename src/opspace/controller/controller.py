@@ -7,6 +7,7 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
+from opspace.controller.batch import Batch, check_members, checked_states, cores
 from opspace.controller.command import Command, Status
 from opspace.controller.compiled.layout import (
     DAMPING,
@@ -24,15 +25,18 @@ from opspace.controller.compiled.layout import (
 from opspace.controller.compiled.plan import Plan
 from opspace.controller.compiled.report import CompiledReport
 from opspace.controller.compiled.tick import tick
-from opspace.controller.compiled.warm_up import compiled_tick
+from opspace.controller.compiled.warm_up import compiled_batch, compiled_tick
 from opspace.controller.tick import ReferenceController
 from opspace.errors import InputError
 from opspace.law.compiled.profiles import PROFILE_CODE
 from opspace.robots.base import AdapterBase
+from opspace.robots.dynamics import make_dynamics
 from opspace.robots.motion_axes import MotionAxes
+from opspace.robots.rigid_model import RigidModel
 from opspace.stack import Member
 
 STATUSES = tuple(Status(bits) for bits in range(1024))
+TIME_JUMP, FAULT = int(Status.TIME_JUMP), int(Status.FAULT)
 
 
 class Controller(ReferenceController):
@@ -48,6 +52,8 @@ class Controller(ReferenceController):
 
     _axes: MotionAxes | None = None
     _plan: Plan | None = None
+    _bodies: RigidModel | None = None
+    _batch: Batch | None = None
 
     def step(self, t: float, q: ArrayLike, v: ArrayLike) -> Command:
         """Compute the torque for one state; see `ReferenceController.step`."""
@@ -65,12 +71,14 @@ class Controller(ReferenceController):
         if q.shape != axes.q.shape or v.shape != axes.v.shape:
             robot.check_state(q, v)
         robot.place(q, v)
-        timing = Status.OK
+        if self._bodies is None:
+            robot.catch_up()
+        timing = 0  # a number: the operators of flags cost as much as all of Python here
         if self._timing is not None:
             robot.check_state(q, v)
-            timing = self._timing.check(t, q, v)
-            if timing & Status.TIME_JUMP and self._holds:
-                return self._hold(t, timing)
+            timing = int(self._timing.check(t, q, v))
+            if timing & TIME_JUMP and self._holds:
+                return self._hold(t, STATUSES[timing])
         members = self.stack.begin_tick(t)
         plan = self._plan
         if plan is None or members is not plan.members:
@@ -78,17 +86,11 @@ class Controller(ReferenceController):
                 return super().step(t, q, v)
             plan = self._plan = self._planned(members, axes)
         plan.refresh(robot, t)
-        observer = self._observer
-        if observer is not None:
-            observer.observe(t, v)
-            plan.disturb(observer.acceleration)
-        answer = tick(t, plan.handle)
+        answer = tick(t, plan.handle) if self._observer is None else self._learn(t, v, plan)
         if answer < 0:
             if answer == STATE_NOT_FINITE:
                 robot.check_state(q, v)
-            return self._hold(t, timing | Status.FAULT)
-        if observer is not None:
-            observer.remember(t, v, plan.tick.joint_acceleration)
+            return self._hold(t, STATUSES[timing | FAULT])
         found = plan.memory.copy()
         return Command(
             t,
@@ -97,6 +99,65 @@ class Controller(ReferenceController):
             answer // SOLVE,
             CompiledReport(plan, found),
         )
+
+    def _learn(self, t: float, v: np.ndarray, plan: Plan) -> int:
+        """Tick with joint limits that learn what the model does not explain."""
+        observer = self._observer
+        assert observer is not None
+        observer.observe(t, v)
+        plan.disturb(observer.acceleration)
+        answer = tick(t, plan.handle)
+        if answer >= 0:
+            observer.remember(t, v, plan.tick.joint_acceleration)
+        return answer
+
+    def torque_batch(
+        self,
+        Q: ArrayLike,
+        V: ArrayLike,
+        t: float | None = None,
+        *,
+        threads: int | None = None,
+    ) -> np.ndarray:
+        """Compute the torque of the present stack at many states at once.
+
+        Row k is what `step` would answer as the next tick, at time ``t``, in the state
+        (Q[k], V[k]), if no request began or ended with it: activations, targets and gains are
+        those of the moment. The call changes nothing: neither the controller nor its robot nor
+        its tasks. It computes the dynamics itself and uses every core; the first call on a machine
+        compiles for half a minute.
+
+        Activations of the user's own (`Task.activation`) are called in Python, once per state;
+        references in time once per call. Call it from the thread that ticks.
+
+        Args:
+            Q: (states, nq) configurations.
+            V: (states, n) velocities, rad/s.
+            t: Time, s; None is the time of the last tick, 0 before the first.
+            threads: Number of threads; None is one for each core that the process may use.
+
+        Returns:
+            (states, n) torques, N·m, bias included; always finite. In a state where the model
+            gives nothing usable it is the braking torque that `step` gives with ``Status.FAULT``.
+
+        Raises:
+            InputError: A wrong shape or a number that is not finite, with its row; a task that is
+                evaluated in Python, or that holds what it will find at its first tick; a
+                robot of the user's own.
+        """
+        if t is None:
+            t = self.stack.time or 0.0
+        if not math.isfinite(t):
+            raise InputError(f"time must be finite, got {t}")
+        if threads is not None and threads < 1:
+            raise InputError(f"a batch needs at least one thread, got {threads}")
+        members = self.stack.members
+        check_members(members)
+        batch = self._batch
+        threads = threads or cores()
+        if batch is None or batch.members is not members or batch.threads != threads:
+            batch = self._batch = self._batched(members, threads)
+        return batch.torque(*checked_states(batch.robot, Q, V), float(t), self._plan)
 
     def warm_up(self) -> float:
         """Compile the tick, or read what was compiled before; the first tick does it otherwise.
@@ -111,8 +172,27 @@ class Controller(ReferenceController):
         return 0.0 if axes is None else compiled_tick()
 
     def _compiled_robot(self) -> MotionAxes | None:
+        """Give the robot's arrays: computed by compiled code where it can, else by its library."""
         robot = self.robot
-        return robot.motion_axes() if isinstance(robot, AdapterBase) else None
+        axes = robot.motion_axes() if isinstance(robot, AdapterBase) else None
+        if axes is None or not isinstance(robot, AdapterBase):
+            return None
+        model = self._bodies = robot.rigid_model()
+        if model is None:
+            return axes
+        return model.motion_axes(make_dynamics(model.bodies), *robot.state)
+
+    def _batched(self, members: tuple[Member, ...], threads: int) -> Batch:
+        robot = self.robot
+        if self._bodies is None and isinstance(robot, AdapterBase):
+            self._bodies = robot.rigid_model()
+        if self._bodies is None or not isinstance(robot, AdapterBase):
+            raise InputError(
+                f"robot {robot.name!r} is not one of load_robot with hinges and slides; a batch "
+                "needs its bodies"
+            )
+        compiled_batch()
+        return Batch(robot, self._bodies, members, self._planned, threads)
 
     def _planned(self, members: tuple[Member, ...], axes: MotionAxes) -> Plan:
         plan = Plan(

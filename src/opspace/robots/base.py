@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,12 +13,15 @@ from opspace.errors import InputError, unknown_name
 from opspace.robots.description import Description
 from opspace.robots.motion_axes import MotionAxes
 
+if TYPE_CHECKING:
+    from opspace.robots.rigid_model import RigidModel
+
 
 class AdapterBase(ABC):
     """A robot whose per-frame quantities are computed on demand and kept until the next update.
 
     Every array handed out is read-only; ``q``, ``v``, ``M`` and ``bias`` are views that the next
-    update overwrites.
+    update overwrites, or the next question after `place`.
     """
 
     def __init__(self, description: Description) -> None:
@@ -51,6 +55,7 @@ class AdapterBase(ABC):
         self._q_view = _view(self._q)
         self._v_view = _view(self._v)
         self._cache: dict[tuple[str, int], np.ndarray] = {}
+        self._behind = False
 
     @property
     def q(self) -> np.ndarray:
@@ -94,10 +99,11 @@ class AdapterBase(ABC):
         for i in self.description.quaternions:
             self._q[i : i + 4] /= math.sqrt(q[i : i + 4] @ q[i : i + 4])
         self._cache.clear()
+        self._behind = False
         self._compute()
 
     def place(self, q: np.ndarray, v: np.ndarray) -> None:
-        """Set a state that is checked elsewhere: `update` without its checks.
+        """Set a state that is checked elsewhere; the dynamics follow when somebody asks.
 
         Args:
             q: (nq,) configuration of a robot without quaternions.
@@ -105,8 +111,20 @@ class AdapterBase(ABC):
         """
         self._q[:] = q
         self._v[:] = v
-        self._cache.clear()
-        self._compute()
+        if self._cache:
+            self._cache.clear()
+        self._behind = True
+
+    def catch_up(self) -> None:
+        """Run the dynamics at the state of the last `place`, unless that has been done."""
+        if self._behind:
+            self._behind = False
+            self._compute()
+
+    @property
+    def state(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return the arrays that hold q and v, which compiled code reads."""
+        return self._q, self._v
 
     def frame_id(self, name: str) -> int:
         """Return the id of a frame.
@@ -166,6 +184,10 @@ class AdapterBase(ABC):
         """Return the arrays that compiled code reads, or None if a joint has several coordinates."""
 
     @abstractmethod
+    def rigid_model(self) -> RigidModel | None:
+        """Return the bodies as numbers, or None if there is a joint that they cannot describe."""
+
+    @abstractmethod
     def integrate(self, q: np.ndarray, v: np.ndarray, dt: float) -> np.ndarray:
         """Return q ⊕ v dt on the configuration manifold, (nq,)."""
 
@@ -205,6 +227,7 @@ class AdapterBase(ABC):
         key = (what, frame)
         value = self._cache.get(key)
         if value is None:
+            self.catch_up()
             value = compute(frame)
             value.setflags(write=False)
             self._cache[key] = value

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
+
+from opspace.robots.dynamics import Dynamics, RigidBodies, make_dynamics, no_bodies
 
 
 @dataclass(frozen=True)
@@ -58,6 +60,8 @@ class MotionAxes:
         parent: (n,) the joint before each joint on the way to the base, −1 for none.
         frames: Frames by id.
         masses: Mass of the moving links.
+        bodies: What compiled code computes the dynamics from; none where the robot's library does.
+        dynamics: Where it computes them.
     """
 
     q: np.ndarray
@@ -69,3 +73,5 @@ class MotionAxes:
     parent: np.ndarray
     frames: Mapping[int, FramePlace]
     masses: tuple[MassPoint, ...]
+    bodies: RigidBodies = field(default_factory=no_bodies)
+    dynamics: Dynamics = field(default_factory=lambda: make_dynamics(no_bodies()))

@@ -11,6 +11,8 @@ import numpy as np
 from opspace.robots.base import AdapterBase
 from opspace.robots.description import Description
 from opspace.robots.motion_axes import FramePlace, MassPoint, MotionAxes
+from opspace.robots.pinocchio_model import frame_ids, model_from_mujoco
+from opspace.robots.rigid_model import RigidModel, rigid_model
 from opspace.robots.world_axes import placements, world_axes
 
 
@@ -59,11 +61,13 @@ class MujocoRobot(AdapterBase):
     @property
     def M(self) -> np.ndarray:
         """Return the joint-space inertia, (nv, nv), armature included."""
+        self.catch_up()
         return self._M_view
 
     @property
     def bias(self) -> np.ndarray:
         """Return b + g, (nv,) N·m. Friction is not part of it."""
+        self.catch_up()
         return self._bias_view
 
     def fresh(self) -> MujocoRobot:
@@ -98,6 +102,11 @@ class MujocoRobot(AdapterBase):
                 for b in self._massive
             ),
         )
+
+    def rigid_model(self) -> RigidModel | None:
+        """Return the bodies as numbers; they are those of the same model in Pinocchio."""
+        model = model_from_mujoco(self._model)
+        return rigid_model(model, frame_ids(model, self.description))
 
     def _last_dof(self, body: int) -> int:
         """Return the last joint coordinate that moves a body, −1 for none."""

@@ -12,8 +12,9 @@ import pinocchio as pin
 
 from opspace.robots.base import AdapterBase
 from opspace.robots.description import Description
-from opspace.robots.motion_axes import FramePlace, MassPoint, MotionAxes
+from opspace.robots.motion_axes import MotionAxes
 from opspace.robots.pinocchio_model import frame_ids
+from opspace.robots.rigid_model import RigidModel, frame_places, mass_points, rigid_model
 
 ALIGNED = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
 # Looked up once: an attribute of the module costs as much as some of the mathematics.
@@ -53,11 +54,13 @@ class PinocchioRobot(AdapterBase):
     @property
     def M(self) -> np.ndarray:
         """Return the joint-space inertia, (nv, nv), armature included."""
+        self.catch_up()
         return self._M
 
     @property
     def bias(self) -> np.ndarray:
         """Return b + g, (nv,) N·m. Friction is not part of it."""
+        self.catch_up()
         return self._bias
 
     def fresh(self) -> PinocchioRobot:
@@ -69,7 +72,7 @@ class PinocchioRobot(AdapterBase):
         model = self._model
         if self.nq != self.nv or model.njoints != self.nv + 1 or self._placement is None:
             return None
-        frames = {id_: _frame_place(model.frames[f]) for id_, f in enumerate(self._frames)}
+        last = np.arange(-1, self.nv)
         return MotionAxes(
             q=self._q,
             v=self._v,
@@ -78,13 +81,13 @@ class PinocchioRobot(AdapterBase):
             axes=self._data.J.T,
             placement=self._placement,
             parent=np.array([model.parents[j] - 1 for j in range(1, model.njoints)]),
-            frames=frames,
-            masses=tuple(
-                MassPoint(j, j - 1, inertia.mass, np.array(inertia.lever))
-                for j, inertia in enumerate(model.inertias)
-                if j > 0 and inertia.mass > 0.0
-            ),
+            frames=frame_places(model, self._frames, last),
+            masses=mass_points(model, last),
         )
+
+    def rigid_model(self) -> RigidModel | None:
+        """Return the bodies as numbers, or None if there is a joint that they cannot describe."""
+        return rigid_model(self._model, self._frames)
 
     def integrate(self, q: np.ndarray, v: np.ndarray, dt: float) -> np.ndarray:
         """Return q ⊕ v dt on the configuration manifold, (nq,)."""
@@ -156,13 +159,6 @@ def _quaternion_order(
     for start in quaternions:
         index[start : start + 4] = start + np.array(order)
     return index
-
-
-def _frame_place(frame: Any) -> FramePlace:
-    """Return where a frame is: joint j moves coordinate j − 1, joint 0 is the world."""
-    placement = frame.placement
-    local = np.concatenate((placement.rotation.T.reshape(9), placement.translation))
-    return FramePlace(int(frame.parentJoint), int(frame.parentJoint) - 1, local)
 
 
 def _contiguous_placements(data: Any) -> np.ndarray | None:

@@ -96,6 +96,16 @@ class Stack:
         """Whether no transition was on its way or due at the last tick; later ones may wait."""
         return self._transitions.settled()
 
+    @property
+    def time(self) -> float | None:
+        """Time of the controller's last tick, s, or None before the first."""
+        return self._transitions.now
+
+    @property
+    def members(self) -> tuple[Member, ...]:
+        """The tasks of the last tick with their places, or those there are at the start."""
+        return self._transitions.present()
+
     def insert(
         self,
         task: Task,

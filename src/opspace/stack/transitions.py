@@ -63,6 +63,15 @@ class Transitions:
             due = any(_is_due(queued.request, now) for queued in self._queue)
             return not due and all(member.settled(now) for member in self._members.values())
 
+    def present(self) -> tuple[Member, ...]:
+        """Return the tasks of the last tick, or those there are at the start."""
+        return self._ticked
+
+    @property
+    def now(self) -> float | None:
+        """Time of the last tick, s, or None before the first."""
+        return self._now
+
     def ask(self, request: Request) -> None:
         """Queue a request.
 

@@ -33,6 +33,7 @@ def run_on_ray(
     """
     try:
         import ray  # noqa: PLC0415 # pyright: ignore[reportMissingImports] - an extra
+        from ray.exceptions import RayError  # noqa: PLC0415 # pyright: ignore[reportMissingImports]
     except ImportError:
         raise missing_extra("ray", "sweep") from None
     try:
@@ -54,6 +55,6 @@ def run_on_ray(
         index = running.pop(done[0])
         try:
             yield ray.get(done[0])
-        except ray.exceptions.RayError as error:
+        except RayError as error:
             reason = f"{type(error).__name__}: {error}".splitlines()[0]
             yield {**empty_row(plan, index), "ended": "died", "reason": reason}

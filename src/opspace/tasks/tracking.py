@@ -98,6 +98,12 @@ class TrackingTask(Task):
             self._target = replace(self._target, goal=self._goal(value))
 
     @property
+    def holds_nothing_yet(self) -> bool:
+        """Whether the task will hold what it finds, and has found nothing yet."""
+        goal = self._target.goal
+        return isinstance(goal, Hold) and (self._held is None or self._held[0] is not goal)
+
+    @property
     def target_velocity(self) -> Array:
         """(k,) desired velocity beside a target value, m/s or rad/s; None sets it to zero."""
         return self._target.velocity
@@ -173,7 +179,7 @@ class TrackingTask(Task):
         goal = target.goal
         if isinstance(goal, Hold):
             held = self._held
-            if held is None or held[0] is not goal:
+            if held is None or held[0] is not goal:  # see `holds_nothing_yet`
                 held = self._held = (goal, current().copy())
             goal = held[1]
         elif callable(goal):

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from opspace.controller.command import Status
 from opspace.controller.compiled.layout import (
     BUFFER,
@@ -119,8 +117,8 @@ def keep_bounds(k):
     solve_lower_transposed(k.L, n, x)
     if not _excess(k) > BROKEN:
         return 0
-    lower, upper, least, most = _bounds(k)
-    nearest_acceleration(k.L, x, lower, upper, least, most)
+    _bounds(k, n)
+    nearest_acceleration(k.L, x, k.bounds)
     for a in range(n):
         k.tau[a] = k.bias[a]
         for b in range(n):
@@ -142,19 +140,18 @@ def _excess(k):
 
 
 @jit
-def _bounds(k):
-    """Least and largest acceleration and torque beside the bias of every joint."""
-    n = k.v.shape[0]
-    lower, upper = np.full(n, -math.inf), np.full(n, math.inf)
-    least, most = np.full(n, -math.inf), np.full(n, math.inf)
+def _bounds(k, n):
+    """Least and largest acceleration, and torque beside the bias, of every joint."""
+    b = k.bounds
+    for a in range(n):
+        b.lower[a], b.upper[a] = -math.inf, math.inf
+        b.least[a], b.most[a] = -math.inf, math.inf
+        if k.option[KEEP_TORQUE] != 0.0:
+            b.least[a] = -k.torque_limit[a] - k.bias[a]
+            b.most[a] = k.torque_limit[a] - k.bias[a]
     for i in range(k.limit.shape[0]):
         limit, j = k.limit[i], k.limit_joint[i]
         if limit[SIGN] > 0.0:
-            upper[j] = limit[COMMAND]
+            b.upper[j] = limit[COMMAND]
         else:
-            lower[j] = -limit[COMMAND]
-    if k.option[KEEP_TORQUE] != 0.0:
-        for a in range(n):
-            least[a] = -k.torque_limit[a] - k.bias[a]
-            most[a] = k.torque_limit[a] - k.bias[a]
-    return lower, upper, least, most
+            b.lower[j] = -limit[COMMAND]

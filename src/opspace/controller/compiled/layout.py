@@ -5,9 +5,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba.experimental import structref
 
-from opspace.law.compiled.jit import Handle, handle, jit
+from opspace.law.compiled.handle import Handle
+from opspace.law.compiled.nearest import bounds_handle, make_bounds
+from opspace.robots.motion_axes import MotionAxes
 
 # Kinds of tasks.
 OWN, MOTION, JOINTS = range(3)
@@ -164,75 +165,10 @@ class Tick(NamedTuple):
     joint_acceleration: np.ndarray
 
 
-@structref.register
-class TickType(Handle):
-    """Compiled side of `Tick`."""
-
-
-_new = handle(TickType, (*Tick._fields, "space"))
-
-
-@jit
-def tick_handle(t, space):
-    """Make the handle with which compiled functions reach a `Tick` and the memory of its walk."""
-    return _new(
-        t.q,
-        t.v,
-        t.M,
-        t.bias,
-        t.axes,
-        t.placement,
-        t.parent,
-        t.mass_place,
-        t.mass,
-        t.kind,
-        t.numbers,
-        t.coordinate,
-        t.select,
-        t.goal,
-        t.kp,
-        t.kv,
-        t.row_weight,
-        t.variable,
-        t.group,
-        t.slots,
-        t.slot_on,
-        t.slot_off,
-        t.slot_place,
-        t.own,
-        t.limit_joint,
-        t.limit,
-        t.torque_limit,
-        t.option,
-        t.tau,
-        t.h,
-        t.share,
-        t.error,
-        t.wanted,
-        t.limit_h,
-        t.limit_wanted,
-        t.scale,
-        t.Jw,
-        t.J,
-        t.drift,
-        t.fw,
-        t.L,
-        t.velocity,
-        t.acceleration,
-        t.motion,
-        t.motion_J,
-        t.motion_error,
-        t.value,
-        t.chained,
-        t.order,
-        t.corner_on,
-        t.corner_weight,
-        t.limit_on,
-        t.limit_weight,
-        t.limit_order,
-        t.rest,
-        t.u,
-        t.drop,
-        t.joint_acceleration,
-        space,
-    )
+def tick_handle(t: Tick, space: Handle, axes: MotionAxes) -> Handle:
+    """Make the handle with which compiled functions reach a `Tick`, its walk, and the robot."""
+    bodies = Handle("RigidBodies", axes.bodies._asdict())
+    dynamics = Handle("Dynamics", axes.dynamics._asdict())
+    bounds = bounds_handle(make_bounds(t.v.size))
+    parts = {"space": space, "bodies": bodies, "dynamics": dynamics, "bounds": bounds}
+    return Handle("Tick", {**t._asdict(), **parts})

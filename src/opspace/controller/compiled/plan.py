@@ -85,7 +85,7 @@ class Plan:
         self._pack_slots()
         if limits is not None:
             _pack_limits(limits, scales, self.tick)
-        self.handle = tick_handle(self.tick, space_handle(space))
+        self.handle = tick_handle(self.tick, space_handle(space), axes)
 
     @staticmethod
     def fits(members: Sequence[Member]) -> bool:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -113,7 +114,7 @@ class CompiledReport:
         return LevelStatus(level, names, sigma, activation, directions, scale)
 
 
-@jit
+@partial(jit, counted=True)
 def spectrum(Jw, rows, basis, free, option):
     """Directions of a level, strongest first: σ, activation, and vectors as columns (Eq. 25)."""
     m, n = rows.size, Jw.shape[1]

@@ -31,6 +31,7 @@ from opspace.law.compiled.jit import jit
 from opspace.law.compiled.level import solve_level, take_alternative
 from opspace.law.compiled.profiles import ramp
 from opspace.law.compiled.walk import begin, keep_inside, pass_on, slot_bit, walk
+from opspace.robots.dynamics import evaluate
 
 LIMIT_PASSES = 4
 NO_GROUP, EXACT, CHAINED = range(3)
@@ -54,6 +55,8 @@ def tick(t, k):
     """
     if not _finite(k.q) or not _finite(k.v):
         return STATE_NOT_FINITE
+    if k.bodies.kind.shape[0] > 0:
+        evaluate(k.bodies, k.q, k.v, k.dynamics)
     activations(t, k)
     evaluate_tasks(k)
     n = k.v.shape[0]

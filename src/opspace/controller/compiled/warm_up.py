@@ -4,16 +4,22 @@ from __future__ import annotations
 
 import logging
 import time
+from collections.abc import Callable
 from threading import Timer
+from typing import Any
 
 import numpy as np
 
+from opspace.controller.compiled.batch import Remembered, ticks
 from opspace.controller.compiled.layout import OPTION_SIZE, Tick, tick_handle
 from opspace.controller.compiled.memory import Sizes, make_tick
 from opspace.controller.compiled.report import spectrum
 from opspace.controller.compiled.tick import tick
+from opspace.law.compiled.handle import Handle
 from opspace.law.compiled.space import space_handle
+from opspace.robots.dynamics import ALIGNED, RigidBodies, make_dynamics
 from opspace.robots.motion_axes import MotionAxes
+from opspace.robots.rigid_model import RigidModel
 
 log = logging.getLogger("opspace")
 
@@ -29,28 +35,60 @@ def compiled_tick() -> float:
     """
     if tick.signatures:
         return 0.0
+
+    def call() -> None:
+        tick(0.0, tick_handle(*_smallest(_axes())))
+        spectrum(np.ones((1, 1)), np.zeros(1, np.int64), np.ones((1, 1)), 1, np.zeros(OPTION_SIZE))
+
+    return _announced("the control tick", tick, call)
+
+
+def compiled_batch() -> float:
+    """Compile the tick for many states or read it from the disk; immediate when that has happened.
+
+    Returns:
+        How long it took, s.
+    """
+    if ticks.signatures:
+        return 0.0
+
+    def call() -> None:
+        bodies = _one_body()
+        state = np.zeros((1, 1))
+        axes = RigidModel(bodies, {}, ()).motion_axes(
+            make_dynamics(bodies), np.zeros(1), np.zeros(1)
+        )
+        before = Remembered(np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros((0, 4)))
+        start = Handle("Remembered", before._asdict())
+        k = tick_handle(*_smallest(axes))
+        ticks(0.0, k, start, state, state, np.ones((1, 0)), 0, 1, state.copy())
+
+    return _announced("the control tick for many states", ticks, call)
+
+
+def _announced(what: str, compiled: Any, call: Callable[[], None]) -> float:
+    """Call compiled code for the first time, and say so when it takes long."""
     start = time.perf_counter()
-    announcement = Timer(PATIENCE, _announce)
+    announcement = Timer(PATIENCE, _announce, (what,))
     announcement.daemon = True
     announcement.start()
     try:
-        tick(0.0, tick_handle(*_smallest()))
-        spectrum(np.ones((1, 1)), np.zeros(1, np.int64), np.ones((1, 1)), 1, np.zeros(OPTION_SIZE))
+        call()
     finally:
         announcement.cancel()
     seconds = time.perf_counter() - start
-    if sum(tick.stats.cache_misses.values()):
-        log.warning("compiled the control tick in %.0f s; it is kept for the next start", seconds)
+    if sum(compiled.stats.cache_misses.values()):
+        log.warning("compiled %s in %.0f s; it is kept for the next start", what, seconds)
     return seconds
 
 
-def _announce() -> None:
-    log.warning("compiling the control tick, once after each installation: about half a minute")
+def _announce(what: str) -> None:
+    log.warning("compiling %s, once after each installation: about half a minute", what)
 
 
-def _smallest() -> tuple[Tick, object]:
-    """Make the arrays of a robot with one joint and no task."""
-    axes = MotionAxes(
+def _axes() -> MotionAxes:
+    """Make the arrays of a robot with one joint."""
+    return MotionAxes(
         q=np.zeros(1),
         v=np.zeros(1),
         M=np.ones((1, 1)),
@@ -61,6 +99,33 @@ def _smallest() -> tuple[Tick, object]:
         frames={},
         masses=(),
     )
+
+
+def _one_body() -> RigidBodies:
+    """Make a body of one kilogram behind one hinge."""
+    two, integers = np.zeros(2), np.int64
+    place = np.zeros((2, 12))
+    place[:, [0, 4, 8]] = 1.0
+    return RigidBodies(
+        kind=np.full(2, ALIGNED, integers),
+        parent=np.zeros(2, integers),
+        place=place,
+        axis=np.array([[0.0, 0.0, 1.0]] * 2),
+        along=np.full(2, 2, integers),
+        first_q=np.zeros(2, integers),
+        first_v=np.zeros(2, integers),
+        width=np.array([0, 1], integers),
+        mass=two + 1.0,
+        centre=np.zeros((2, 3)),
+        tensor=np.ones((2, 6)),
+        before=np.array([-1], integers),
+        armature=np.zeros(1),
+        gravity=np.zeros(3),
+    )
+
+
+def _smallest(axes: MotionAxes) -> tuple[Tick, Handle, MotionAxes]:
+    """Make the arrays of a tick for one joint and no task."""
     size = Sizes(n=1, tasks=0, rows=0, slots=0, levels=0, variables=0, limits=0, corners=1)
     memory, space, _ = make_tick(size, axes, np.ones(1), np.zeros(OPTION_SIZE))
-    return memory, space_handle(space)
+    return memory, space_handle(space), axes

@@ -5,9 +5,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba.experimental import structref
 
-from opspace.law.compiled.jit import Handle, handle, jit
+from opspace.law.compiled.handle import Handle
 
 
 class Space(NamedTuple):
@@ -128,49 +127,6 @@ def make_space(n: int, depth: int, rows: int) -> Space:
     )
 
 
-@structref.register
-class SpaceType(Handle):
-    """Compiled side of `Space`."""
-
-
-_new = handle(SpaceType, Space._fields)
-
-
-@jit
-def space_handle(s):
+def space_handle(s: Space) -> Handle:
     """Make the handle with which compiled functions reach a `Space`."""
-    return _new(
-        s.Z,
-        s.u,
-        s.free,
-        s.V,
-        s.strength,
-        s.share,
-        s.path,
-        s.cursor,
-        s.alternatives,
-        s.top,
-        s.chosen,
-        s.width,
-        s.off,
-        s.faded,
-        s.B,
-        s.C,
-        s.residual,
-        s.rows,
-        s.G,
-        s.R,
-        s.Y,
-        s.x,
-        s.y,
-        s.scale,
-        s.sigma,
-        s.basis,
-        s.motors,
-        s.factor,
-        s.start,
-        s.limit,
-        s.torque,
-        s.part,
-        s.got,
-    )
+    return Handle("Space", s._asdict())

@@ -1,0 +1,206 @@
+"""Torques of one stack at many states at once, on every core."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from opspace.controller.compiled.batch import Remembered, ticks
+from opspace.controller.compiled.layout import OWN, REMEMBERS, TURN
+from opspace.controller.compiled.packing import kind_of, own_activation
+from opspace.controller.compiled.plan import Plan
+from opspace.errors import InputError
+from opspace.law.compiled.handle import Handle
+from opspace.robots.base import AdapterBase
+from opspace.robots.dynamics import make_dynamics
+from opspace.robots.motion_axes import MotionAxes
+from opspace.robots.rigid_model import RigidModel
+from opspace.stack import Member
+from opspace.tasks.tracking import TrackingTask
+
+CHUNK = 64
+"""States that a thread takes at a time: some tenths of a millisecond, so that all end together."""
+
+Planned = Callable[[tuple[Member, ...], MotionAxes], Plan]
+
+
+class Batch:
+    """A stack at the moment, ready to be evaluated in many states.
+
+    Every thread has a plan and dynamics of its own; what they share is only read.
+
+    Attributes:
+        robot: The robot.
+        members: The tasks.
+        threads: Number of threads.
+
+    Args:
+        robot: The robot of the controller; its state is never touched.
+        model: Its bodies.
+        members: The tasks.
+        planned: Makes a plan for them.
+        threads: Number of threads.
+    """
+
+    def __init__(
+        self,
+        robot: AdapterBase,
+        model: RigidModel,
+        members: tuple[Member, ...],
+        planned: Planned,
+        threads: int,
+    ) -> None:
+        self.members = members
+        self.threads = threads
+        self.robot = robot
+        self._plans = [planned(members, _axes(model)) for _ in range(threads)]
+
+    def torque(self, Q: np.ndarray, V: np.ndarray, t: float, before: Plan | None) -> np.ndarray:
+        """Compute the torque at every state.
+
+        Args:
+            Q: (states, n) configurations, finite.
+            V: (states, n) velocities, finite.
+            t: Time, s.
+            before: The plan of the tick before, None if there was none.
+
+        Returns:
+            (states, n) torques, N·m.
+
+        Raises:
+            InputError: A reference or activation gave unusable numbers.
+        """
+        own = self._own_activations(Q, V, t)
+        for plan in self._plans:
+            plan.refresh(self.robot, t)
+        remembered = _remembered(self._plans[0], before)
+        tau = np.zeros(Q.shape)
+        chunks = iter(range(0, len(Q), CHUNK))
+
+        def work(plan: Plan) -> None:
+            for first in chunks:  # the next one that nobody has taken
+                end = min(first + CHUNK, len(Q))
+                ticks(t, plan.handle, remembered, Q, V, own, first, end, tau)
+
+        used = self._plans[: max(1, -(-len(Q) // CHUNK))]
+        if len(used) == 1:
+            work(used[0])
+        else:
+            with ThreadPoolExecutor(len(used)) as pool:  # a kept one would not live in a fork
+                list(pool.map(work, used))
+        return tau
+
+    def _own_activations(self, Q: np.ndarray, V: np.ndarray, t: float) -> np.ndarray:
+        """Evaluate the activations that users gave to tasks, in Python, state by state."""
+        own = np.ones((1, len(self.members)))
+        chosen = [i for i, m in enumerate(self.members) if m.task.activation is not None]
+        if not chosen:
+            return own
+        own = np.ones((len(Q), len(self.members)))
+        robot = self.robot.fresh()
+        for row, q, v in zip(own, Q, V, strict=True):
+            robot.update(q, v)
+            for i in chosen:
+                row[i] = own_activation(self.members[i].task, robot, t)
+        return own
+
+
+def _axes(model: RigidModel) -> MotionAxes:
+    n = model.bodies.before.size
+    return model.motion_axes(make_dynamics(model.bodies), np.zeros(n), np.zeros(n))
+
+
+def cores() -> int:
+    """Return how many cores this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def checked_states(robot: AdapterBase, Q: ArrayLike, V: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
+    """Check states and copy them.
+
+    Args:
+        robot: The robot.
+        Q: (states, nq) configurations.
+        V: (states, n) velocities.
+
+    Returns:
+        Both as arrays.
+
+    Raises:
+        InputError: A wrong shape or a number that is not finite; it names the row.
+    """
+    q, v = _matrix("Q", Q, robot.nq, robot), _matrix("V", V, robot.nv, robot)
+    if len(q) != len(v):
+        raise InputError(f"Q has {len(q)} rows, V has {len(v)}: one of each for every state")
+    good = np.isfinite(q).all(axis=1) & np.isfinite(v).all(axis=1)
+    if not good.all():
+        row = int(np.argmin(good))
+        try:
+            robot.check_state(q[row], v[row])
+        except InputError as error:
+            raise InputError(f"row {row}: {error}") from None
+    return q, v
+
+
+def _matrix(name: str, value: ArrayLike, size: int, robot: AdapterBase) -> np.ndarray:
+    try:
+        # A copy of one kind, whatever is given: compiled code distinguishes them.
+        found = np.array(value, dtype=float, order="C")
+    except (TypeError, ValueError):
+        row = next((i for i, given in _rows(value) if np.shape(given) != (size,)), None)
+        where = "" if row is None else f"row {row}: "
+        raise InputError(
+            f"{where}{name} must be numbers of shape (states, {size}) for {robot.name}"
+        ) from None
+    if found.ndim != 2 or found.shape[1] != size:
+        raise InputError(f"{name} for {robot.name} has shape {found.shape}, not (states, {size})")
+    return found
+
+
+def _rows(value: object) -> Iterator[tuple[int, Any]]:
+    return enumerate(value) if isinstance(value, list | tuple) else iter(())
+
+
+def check_members(members: tuple[Member, ...]) -> None:
+    """Check that compiled code can evaluate the tasks in any state.
+
+    Raises:
+        InputError: A task is the user's own, or holds what it finds and has found nothing yet;
+            or there are too many.
+    """
+    if not Plan.fits(members):
+        raise InputError(f"{len(members)} tasks are more than a batch can take; some thirty fit")
+    for member in members:
+        task = member.task
+        if kind_of(task) == OWN:
+            raise InputError(
+                f"task {task.name!r} ({type(task).__name__}) is evaluated in Python, one state "
+                "at a time; a batch takes the tasks of the library only"
+            )
+        if isinstance(task, TrackingTask) and task.holds_nothing_yet:
+            raise InputError(
+                f"task {task.name!r} will hold what it finds at its first tick: give it a target, "
+                "or call step before"
+            )
+
+
+def _remembered(plan: Plan, before: Plan | None) -> Handle:
+    """Return what the plan before leaves to this one."""
+    tick = plan.tick
+    tick.group[:] = 0
+    tick.kind[:, REMEMBERS] = 0
+    if before is not None:
+        plan.go_on_from(before)
+    found = Remembered(
+        group=tick.group.copy(),
+        remembers=tick.kind[:, REMEMBERS].copy(),
+        turn=tick.numbers[:, TURN : TURN + 4].copy(),
+    )
+    return Handle("Remembered", found._asdict())
