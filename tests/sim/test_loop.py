@@ -24,6 +24,9 @@ class Cart:
     def v(self):
         return self.state[1:].copy()
 
+    def measure(self):
+        return self.q, self.v
+
     def advance(self, tau):
         self.log.append(("advance", self.t))
         self.state = self.state + self.dt * np.array([self.state[1], tau[0]])

@@ -60,6 +60,11 @@ class Batch:
         self.robot = robot
         self._plans = [planned(members, _axes(model)) for _ in range(threads)]
 
+    def disturb(self, acceleration: np.ndarray) -> None:
+        """Tell the joint limits what comes on top of the commanded accelerations, (n,) rad/s²."""
+        for plan in self._plans:
+            plan.disturb(acceleration)
+
     def torque(self, Q: np.ndarray, V: np.ndarray, t: float, before: Plan | None) -> np.ndarray:
         """Compute the torque at every state.
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from opspace.errors import ModelError
 from opspace.robots.protocol import Robot
 from opspace.tasks import Task
 from opspace.tasks.motion_task import MotionTask
@@ -56,7 +57,7 @@ class Workspace:
         joint_sigma = np.inf
         for q in sample_postures(robot):
             robot.update(q, np.zeros(robot.nv))
-            inverse = np.linalg.inv(robot.M)
+            inverse = np.linalg.inv(_checked_inertia(robot))
             joint_sigma = min(joint_sigma, float(np.linalg.eigvalsh(inverse)[0]))
             spare = np.maximum(robot.torque_limit - np.abs(robot.gravity), 0.0)
             brake = np.minimum(brake, 0.5 * spare * np.diag(inverse))
@@ -102,6 +103,25 @@ class Workspace:
             if together > STRUCTURAL:
                 reference = reference * together
         return reference
+
+
+def _checked_inertia(robot: Robot) -> np.ndarray:
+    """The inertia, which every joint must have some of."""
+    M = robot.M
+    try:
+        if not np.all(np.isfinite(M)):
+            raise np.linalg.LinAlgError
+        np.linalg.cholesky(M)
+    except np.linalg.LinAlgError:
+        still = M.diagonal() <= 1e-12 * max(1e-300, float(np.nanmax(M.diagonal())))
+        names = [joint for joint, s in zip(robot.joint_names, still, strict=True) if s]
+        which = (
+            f"joint {', '.join(map(repr, names))} moves no mass" if names else "check the masses"
+        )
+        raise ModelError(
+            f"robot {robot.name!r}: its inertia is not positive definite; {which}"
+        ) from None
+    return M
 
 
 def sample_postures(robot: Robot) -> Iterator[np.ndarray]:

@@ -33,6 +33,8 @@ class Status(IntFlag):
     the motors."""
     LIMIT_LOST = 512
     """No torque of the motors keeps what every joint may do; the excess is as small as can be."""
+    HANDOVER = 1024
+    """The torque is on its way from or to another controller's."""
     FAULT = 8
     """No finite torque was found; the command is bias compensation with damping."""
 

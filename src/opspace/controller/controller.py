@@ -35,7 +35,7 @@ from opspace.robots.motion_axes import MotionAxes
 from opspace.robots.rigid_model import RigidModel
 from opspace.stack import Member
 
-STATUSES = tuple(Status(bits) for bits in range(1024))
+STATUSES = tuple(Status(bits) for bits in range(2048))
 TIME_JUMP, FAULT = int(Status.TIME_JUMP), int(Status.FAULT)
 
 
@@ -92,13 +92,14 @@ class Controller(ReferenceController):
                 robot.check_state(q, v)
             return self._hold(t, STATUSES[timing | FAULT])
         found = plan.memory.copy()
-        return Command(
+        command = Command(
             t,
             found[: plan.n],
             STATUSES[answer % SOLVE | timing],
             answer // SOLVE,
             CompiledReport(plan, found),
         )
+        return command if self._handover is None else self._handed_over(command)
 
     def _learn(self, t: float, v: np.ndarray, plan: Plan) -> int:
         """Tick with joint limits that learn what the model does not explain."""
@@ -157,6 +158,8 @@ class Controller(ReferenceController):
         threads = threads or cores()
         if batch is None or batch.members is not members or batch.threads != threads:
             batch = self._batch = self._batched(members, threads)
+        if self._observer is not None:
+            batch.disturb(self._observer.acceleration)
         return batch.torque(*checked_states(batch.robot, Q, V), float(t), self._plan)
 
     def warm_up(self) -> float:

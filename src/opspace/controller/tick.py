@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from opspace.controller.bounds import keep_bounds
 from opspace.controller.command import Command, Found, Status
 from opspace.controller.disturbance import DisturbanceObserver
+from opspace.controller.handover import Handover
 from opspace.controller.joint_limits import (
     Insertion,
     insertions,
@@ -123,7 +124,55 @@ class ReferenceController:
         self.calibration = self._scales.calibration(list(stack))
         if stack.limits is not None:
             stack.limits.bind(robot, self.calibration.brake)
+        self._handover: Handover | None = None
         self._observer = _observer(stack.limits, robot.nv, torque_limits)
+
+    def take_over(self, tau: ArrayLike, duration: float = 0.5) -> None:
+        """Begin at the torque that is on the robot, and move to the controller's own.
+
+        The next tick answers ``tau``; see `opspace.controller.handover.Handover`. Called again, or
+        after `hand_back`, it begins anew.
+
+        Args:
+            tau: (n,) torque that is on the robot now, N·m.
+            duration: How long it takes, s.
+
+        Raises:
+            InputError: A torque of another size or not finite, or a duration that is none.
+        """
+        self._handover = Handover(self._joint_torque(tau), duration, back=False)
+
+    def hand_back(self, tau: ArrayLike, duration: float = 0.5) -> None:
+        """Move from the controller's torque to the one that takes over, and stay there.
+
+        Args:
+            tau: (n,) torque to end at, N·m: what the next controller begins with, or ``robot.gravity``
+                where brakes are about to close.
+            duration: How long it takes, s.
+
+        Raises:
+            InputError: A torque of another size or not finite, or a duration that is none.
+        """
+        self._handover = Handover(self._joint_torque(tau), duration, back=True)
+
+    def _joint_torque(self, tau: ArrayLike) -> np.ndarray:
+        found = np.array(tau, dtype=float)
+        if found.shape != (self.robot.nv,):
+            raise InputError(
+                f"a torque for {self.robot.name!r} has shape ({self.robot.nv},), not {found.shape}"
+            )
+        return found
+
+    def _handed_over(self, command: Command) -> Command:
+        """Mix the torque with another controller's while it takes over or hands back."""
+        handover = self._handover
+        assert handover is not None
+        if self._observer is not None:
+            self._observer.forget_last()
+        tau = handover.torque(command.t, command.tau, self.robot.torque_limit)
+        if handover.done:
+            self._handover = None
+        return command._replace(tau=tau, status=command.status | Status.HANDOVER)
 
     @property
     def blending(self) -> str:
@@ -167,7 +216,8 @@ class ReferenceController:
         if any(np.any(level.activation < 1.0) for level in levels):
             status |= Status.DIRECTION_OFF
         tasks = task_status(members, activations, terms, mixed)
-        return Command(t, tau, status, info.hard_solves, Found(tasks, levels, limits))
+        command = Command(t, tau, status, info.hard_solves, Found(tasks, levels, limits))
+        return command if self._handover is None else self._handed_over(command)
 
     def _activation(self, member: Member, t: float) -> float:
         """Presence in the stack times the task's own activation."""

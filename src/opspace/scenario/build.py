@@ -73,8 +73,10 @@ def build(scenario: Scenario, controller: type[ReferenceController] = Controller
             bias=scenario.bias,
             singularity=_singularity(scenario),
         )
-    except (UnknownNameError, InputError) as error:
-        raise scenario.error(("joint_limits",), str(error)) from error
+    except (InputError, UnknownNameError) as error:
+        raise scenario.error(
+            ("joint_limits", *_unknown_joints(scenario, robot)), str(error)
+        ) from error
     _schedule(scenario, stack, tasks)
     plant = _plant(scenario, robot, q)
     stop = StopRule(scenario.stop.max_joint_speed, scenario.stop.max_torque)
@@ -179,6 +181,13 @@ def _joint_limits(scenario: Scenario) -> JointLimits | None:
         brake_acceleration=option.brake_acceleration,
         profile=SWITCH if scenario.method == "switch" else option.profile,
     )
+
+
+def _unknown_joints(scenario: Scenario, robot: Robot) -> tuple[str, ...]:
+    """Name the entry of the joint limits that has a joint which the robot has not, if there is one."""
+    option = scenario.joint_limits
+    named = {} if option is None else {"joints": option.joints, "speeds": option.speeds}
+    return tuple(key for key, joints in named.items() if set(joints) - set(robot.joint_names))[:1]
 
 
 def _singularity(scenario: Scenario) -> Singularity | None:

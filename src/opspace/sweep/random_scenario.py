@@ -16,7 +16,7 @@ NEAR = 0.05
 """Width of the strip inside a joint limit where joints like to start, rad or m."""
 CLEARANCE = 0.02
 """What joints keep between themselves and their limits, because the model is wrong, rad or m."""
-OBSERVER_TIME = 0.01
+OBSERVER_TIME = 0.002
 """How fast joint limits learn what the model does not explain, s."""
 OUTSIDE = 0.15
 """How far outside its limits a joint may start, rad or m."""

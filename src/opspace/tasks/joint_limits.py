@@ -84,7 +84,7 @@ class JointLimits:
             by δ, because masses or friction are, lets a joint rest δ/(k₁ k₂) beyond where it should.
         brake_acceleration: a, rad/s² or m/s²; None derives it per joint from the torque limits.
         observer_time: Time with which the limits learn the acceleration δ that the model does not
-            explain, s: 0.01 lets them hold although masses are wrong by a fifth. q̈_adm then counts
+            explain, s: 0.002 to 0.01 lets them hold although masses are wrong by a fifth. q̈_adm counts
             without it. The torques must really go to the joints, tick by tick, which takes a
             controller with ``torque_limits="priority"``.
             None trusts the model. Used in mode ``admissible``.
