@@ -186,7 +186,7 @@ def _joint_limits(scenario: Scenario) -> JointLimits | None:
 def _unknown_joints(scenario: Scenario, robot: Robot) -> tuple[str, ...]:
     """Name the entry of the joint limits that has a joint which the robot has not, if there is one."""
     option = scenario.joint_limits
-    named = {} if option is None else {"joints": option.joints, "speeds": option.speeds}
+    named = {} if option is None else {"joints": option.joints, "speeds": option.speeds or {}}
     return tuple(key for key, joints in named.items() if set(joints) - set(robot.joint_names))[:1]
 
 

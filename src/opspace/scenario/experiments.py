@@ -149,6 +149,8 @@ def _singularity(robot: Robot, name: str) -> Scenario:
             "robot": name,
             "duration": 4.5 + 2.0 * duration,
             "tasks": _tasks({"type": "hold"}, target, "reference"),
+            # How fast joints become near a singularity is what is measured.
+            "joint_limits": {"speeds": None},
             "stop": _stop(robot),
         }
     )
@@ -180,7 +182,11 @@ def _joint_limit(robot: Robot, name: str) -> Scenario:
             "robot": name,
             "duration": 6.0,
             "tasks": _tasks(turn, swing, follow),
-            "joint_limits": {"mode": "buffer", "joints": {robot.joint_names[0]: [lower, upper]}},
+            "joint_limits": {
+                "mode": "buffer",
+                "joints": {robot.joint_names[0]: [lower, upper]},
+                "speeds": None,
+            },
             "stop": _stop(robot),
         }
     )

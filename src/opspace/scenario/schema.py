@@ -61,8 +61,9 @@ class JointLimits(Entry):
         default=None,
         description="time with which limits learn what the model does not explain [s]; null: never",
     )
-    speeds: dict[str, Annotated[float, Quantity("rad/s or m/s", above=0.0)]] = Field(
-        default_factory=dict, description="joint: largest speed in place of the robot's own limit"
+    speeds: dict[str, Annotated[float, Quantity("rad/s or m/s", above=0.0)]] | None = Field(
+        default_factory=dict,
+        description="joint: largest speed in place of the robot's own limit; null limits no speed",
     )
     buffer: Annotated[float, Quantity("rad or m", above=0.0)] = Field(
         default=0.1, description="width of the buffer inside each limit, for mode buffer [rad or m]"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,6 +19,9 @@ if TYPE_CHECKING:
 MODES = ("admissible", "buffer")
 """``admissible``: active when the stack is about to ask for more than the joint can still brake.
 ``buffer``: active by position near the limit, as in Section 4.2 of the paper."""
+
+OWN_SPEEDS: Mapping[str, float] = MappingProxyType({})
+"""The speed limits of the robot, none of them replaced."""
 
 RETURN_SPEED = 0.5
 """Speed at which a joint that is outside its limits is brought back, rad/s or m/s."""
@@ -78,8 +82,8 @@ class JointLimits:
         buffer: Width of the position buffer, rad or m; used in mode ``buffer``.
         mode: One of `MODES`.
         joints: Limits (lower, upper) by joint name that replace the robot's own, rad or m.
-        speeds: Largest speed by joint name in place of the robot's own, rad/s or m/s; inf for none.
-            Used in mode ``admissible``.
+        speeds: Largest speed by joint name in place of the robot's own, rad/s or m/s, inf for none;
+            None limits no speed. Used in mode ``admissible``.
         clearance: How far inside its limits every joint is kept, rad or m. An acceleration that is wrong
             by δ, because masses or friction are, lets a joint rest δ/(k₁ k₂) beyond where it should.
         brake_acceleration: a, rad/s² or m/s²; None derives it per joint from the torque limits.
@@ -105,7 +109,7 @@ class JointLimits:
         *,
         mode: str = "admissible",
         joints: Mapping[str, Sequence[float]] | None = None,
-        speeds: Mapping[str, float] | None = None,
+        speeds: Mapping[str, float] | None = OWN_SPEEDS,
         clearance: float = 0.0,
         observer_time: float | None = None,
         brake_acceleration: float | None = None,
@@ -132,6 +136,7 @@ class JointLimits:
         self.profile = profile
         self.brake_acceleration = brake_acceleration
         self._joints = {name: _pair(name, limits) for name, limits in (joints or {}).items()}
+        self._limits_speed = speeds is not None and mode == "admissible"
         self._speeds = {name: _speed(name, speed) for name, speed in (speeds or {}).items()}
         self.sides: tuple[Side, ...] = ()
 
@@ -154,9 +159,9 @@ class JointLimits:
             own = (float(robot.q_lower[index]), float(robot.q_upper[index]))
             limits = self._inside(joint, self._joints.get(joint, own))
             a = float(brake[index]) if self.brake_acceleration is None else self.brake_acceleration
-            speed = self._speeds.get(joint, float(robot.velocity_limit[index]))
-            if self.mode == "buffer":
-                speed = math.inf
+            speed = math.inf
+            if self._limits_speed:
+                speed = self._speeds.get(joint, float(robot.velocity_limit[index]))
             sides += [
                 Side(joint, index, sign, limit, a, speed)
                 for sign, limit in zip((-1.0, 1.0), limits, strict=True)
