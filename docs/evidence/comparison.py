@@ -3,7 +3,7 @@
 import re
 from pathlib import Path
 
-from opspace.compare import Comparison, compare_scenario
+from opspace.compare import METHODS, Comparison, compare_scenario
 from opspace.scenario import load_scenario
 from opspace.scenario.progress import ProgressBar
 
@@ -24,6 +24,13 @@ def markdown(comparison: Comparison, keys: tuple[str, ...] | None) -> str:
     return "".join(f"| {' | '.join(line)} |\n" for line in lines)
 
 
+def kept(old: str, table: str) -> str:
+    """Rows of a method that is not installed here stay as they were measured."""
+    absent = [name for name, method in METHODS.items() if not method.installed()]
+    rows = [row for row in old.splitlines(keepends=True) if row.split(" | ")[0][2:] in absent]
+    return table + "".join(rows)
+
+
 def main() -> None:
     """Run every method and rewrite the blocks between the markers."""
     with ProgressBar() as progress:
@@ -32,7 +39,8 @@ def main() -> None:
         path = ROOT / page
         text = path.read_text(encoding="utf-8")
         table = markdown(found, keys)
-        path.write_text(BLOCK.sub(lambda m, t=table: m[1] + t + m[2], text), encoding="utf-8")
+        new = BLOCK.sub(lambda m, t=table: m[1] + kept(m[0], t) + m[2], text)
+        path.write_text(new, encoding="utf-8")
     (ROOT / "docs/images/comparison.png").write_bytes((OUT / "compare.png").read_bytes())
 
 
