@@ -19,7 +19,7 @@ help:
 $(INSTALLED): pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check uv
-	$(BIN)/uv pip install --quiet --python $(BIN)/python --constraints constraints.txt --editable '.[all,test]'
+	$(BIN)/uv pip install --quiet --python $(BIN)/python --constraints constraints.txt --editable '.[all,docs,test]'
 	@touch $@
 
 lint: $(INSTALLED)
@@ -50,7 +50,7 @@ bench: $(BENCH)/.installed
 	$(BENCH)/bin/opspace bench --core 0 --out results/bench
 
 constraints: $(INSTALLED)
-	$(BIN)/uv pip compile --quiet --universal --upgrade --python-version 3.10 --extra all --extra test --no-header --no-annotate --no-emit-index-url --output-file constraints.txt pyproject.toml
+	$(BIN)/uv pip compile --quiet --universal --upgrade --python-version 3.10 --extra all --extra docs --extra test --no-header --no-annotate --no-emit-index-url --output-file constraints.txt pyproject.toml
 
 clean:
 	rm -rf $(VENV) $(BENCH) results dist build .pytest_cache .ruff_cache .hypothesis
