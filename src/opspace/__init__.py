@@ -57,6 +57,7 @@ if TYPE_CHECKING:
     from opspace.tasks import JointLimits as JointLimits
     from opspace.tasks import JointTask as JointTask
     from opspace.tasks import MinimumJerk as MinimumJerk
+    from opspace.tasks import OrientationJerkLimited as OrientationJerkLimited
     from opspace.tasks import OrientationMinimumJerk as OrientationMinimumJerk
     from opspace.tasks import OrientationTask as OrientationTask
     from opspace.tasks import PoseReference as PoseReference
@@ -91,9 +92,10 @@ _NAMES = {
     "opspace.stack": "Stack",
     "opspace.tasks": (
         "ActivationProduct Chain Circle ComTask Constant DistanceBuffer JerkLimited JointBuffer "
-        "JointLimits JointTask MinimumJerk OrientationMinimumJerk OrientationTask PoseReference "
-        "PoseTask PositionTask PostureTask Reference RelativeOrientationTask RelativePoseTask "
-        "RelativePositionTask Sample Task TaskTerms TrackingTask ViaPoints"
+        "JointLimits JointTask MinimumJerk OrientationJerkLimited OrientationMinimumJerk "
+        "OrientationTask PoseReference PoseTask PositionTask PostureTask Reference "
+        "RelativeOrientationTask RelativePoseTask RelativePositionTask Sample Task TaskTerms "
+        "TrackingTask ViaPoints"
     ),
 }
 _HOME = {name: module for module, names in _NAMES.items() for name in names.split()}

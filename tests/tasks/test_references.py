@@ -18,6 +18,7 @@ from opspace.tasks import (
     Constant,
     JerkLimited,
     MinimumJerk,
+    OrientationJerkLimited,
     OrientationMinimumJerk,
     PoseReference,
     ViaPoints,
@@ -194,6 +195,48 @@ def test_orientation_rates_are_the_derivatives(first, second, duration, phase):
     np.testing.assert_allclose(
         (after.v - before.v) / (2.0 * h), here.a, rtol=0, atol=2e-2 / duration**2
     )
+
+
+LIMITS = {"max_velocity": 1.0, "max_acceleration": 4.0, "max_jerk": 40.0}
+
+
+@given(vectors, vectors, st.floats(0.0, 1.2))
+def test_a_jerk_limited_motion_gets_another_goal_on_its_way_without_a_step(goal, other, t):
+    first = JerkLimited(np.zeros(3), goal, **LIMITS)
+    x, v, a = first(t)
+    second = JerkLimited(x, other, **LIMITS, start_time=t, start_velocity=v, start_acceleration=a)
+    for one, two in zip(second(t), (x, v, a), strict=True):
+        np.testing.assert_array_equal(one, two)
+    np.testing.assert_allclose(second(t + 1e-7).x, x, atol=1e-6)
+    np.testing.assert_allclose(second(t + 1e-7).v, v, atol=1e-6)
+    np.testing.assert_allclose(second(t + 1e-7).a, a, atol=1e-5)
+    np.testing.assert_array_equal(second(t + second.duration + 1e-9).x, other)
+
+
+@given(vectors, vectors, vectors, vectors, st.floats(0.0, 1.0))
+def test_a_jerk_limited_turn_begins_as_told_and_has_true_rates(first, goal, omega, alpha, phase):
+    R_start, R_goal = exp_rotation(first), exp_rotation(goal)
+    turn = OrientationJerkLimited(
+        R_start,
+        R_goal,
+        **LIMITS,
+        start_time=0.5,
+        start_velocity=omega,
+        start_acceleration=alpha,
+    )
+    begin = turn(0.5)
+    for found, told in zip(begin, (R_start, omega, alpha), strict=True):
+        np.testing.assert_allclose(found, told, atol=1e-12)
+    end = turn(0.5 + turn.duration + 1e-9)
+    np.testing.assert_array_equal(end.x, turn.goal)
+    np.testing.assert_array_equal((end.v, end.a), 0.0)
+    t, h = 0.5 + phase * turn.duration, 1e-5
+    before, here, after = turn(max(t - h, 0.5)), turn(t), turn(t + h)
+    span = t + h - max(t - h, 0.5)
+    turned = log_rotation(after.x @ before.x.T) / span
+    # Half a step away where the difference is one-sided; the jerk has corners.
+    np.testing.assert_allclose(turned, here.v, rtol=0, atol=2e-4)
+    np.testing.assert_allclose((after.v - before.v) / span, here.a, rtol=0, atol=5e-3)
 
 
 @given(vectors, vectors)

@@ -17,6 +17,7 @@ from opspace.tasks.references import Circle as Circle
 from opspace.tasks.references import Constant as Constant
 from opspace.tasks.references import JerkLimited as JerkLimited
 from opspace.tasks.references import MinimumJerk as MinimumJerk
+from opspace.tasks.references import OrientationJerkLimited as OrientationJerkLimited
 from opspace.tasks.references import OrientationMinimumJerk as OrientationMinimumJerk
 from opspace.tasks.references import PoseReference as PoseReference
 from opspace.tasks.references import Reference as Reference

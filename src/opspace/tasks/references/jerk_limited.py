@@ -11,11 +11,12 @@ from opspace.tasks.validation import Array, finite, finite_array
 
 
 class JerkLimited:
-    """Moves from rest to rest as fast as velocity, acceleration and jerk limits allow.
+    """Moves to rest at the goal as fast as velocity, acceleration and jerk limits allow.
 
     All coordinates arrive at the same time, and the path is not straight in general (Ruckig,
     Berscheid and Kröger 2021). The motion is computed once, when the reference is built. Holds
-    the start before ``start_time`` and the goal after the motion.
+    the start before ``start_time`` and the goal after the motion. A motion on its way gets another
+    goal without a step by a new reference that begins with its value, velocity and acceleration.
 
     Args:
         start: (k,) first value.
@@ -24,6 +25,8 @@ class JerkLimited:
         max_acceleration: Limit, a number or (k,), unit/s².
         max_jerk: Limit, a number or (k,), unit/s³.
         start_time: Time at which it begins, s.
+        start_velocity: (k,) velocity at that time, unit/s; None is rest. It may be above the limit.
+        start_acceleration: (k,) acceleration at that time, unit/s²; None is none.
 
     Attributes:
         duration: Time of the motion, s.
@@ -41,6 +44,8 @@ class JerkLimited:
         max_acceleration: ArrayLike,
         max_jerk: ArrayLike,
         start_time: float = 0.0,
+        start_velocity: ArrayLike | None = None,
+        start_acceleration: ArrayLike | None = None,
     ) -> None:
         from ruckig import InputParameter, Result, Ruckig, Trajectory  # noqa: PLC0415 - lazy
 
@@ -48,8 +53,14 @@ class JerkLimited:
         self.goal = finite_array(goal, self.start.shape, "JerkLimited: goal")
         self.start_time = finite(start_time, "JerkLimited: start_time")
         size = len(self.start)
+        self._rest = np.zeros(size)
+        velocity = _rate(start_velocity, size, "start_velocity")
+        acceleration = _rate(start_acceleration, size, "start_acceleration")
+        self._first = Sample(self.start, velocity, acceleration)
         motion = InputParameter(size)
         motion.current_position = self.start.tolist()
+        motion.current_velocity = velocity.tolist()
+        motion.current_acceleration = acceleration.tolist()
         motion.target_position = self.goal.tolist()
         motion.max_velocity = _limits(max_velocity, size, "max_velocity").tolist()
         motion.max_acceleration = _limits(max_acceleration, size, "max_acceleration").tolist()
@@ -59,13 +70,14 @@ class JerkLimited:
         if result not in (Result.Working, Result.Finished):
             raise InputError(f"JerkLimited: no motion within these limits ({result.name})")
         self.duration: float = self._trajectory.duration
-        self._rest = np.zeros(size)
 
     def __call__(self, t: float, /) -> Sample:
         """Return the desired motion at time t, s."""
         elapsed = t - self.start_time
-        if elapsed <= 0.0:
+        if elapsed < 0.0:
             return Sample(self.start, self._rest, self._rest)
+        if elapsed == 0.0:
+            return self._first
         if elapsed >= self.duration:
             return Sample(self.goal, self._rest, self._rest)
         x, v, a = self._trajectory.at_time(elapsed)
@@ -77,3 +89,7 @@ def _limits(value: ArrayLike, size: int, what: str) -> Array:
     if (limits <= 0.0).any():
         raise InputError(f"JerkLimited: {what} must be above zero, not {limits.tolist()}")
     return np.broadcast_to(limits, (size,))
+
+
+def _rate(value: ArrayLike | None, size: int, what: str) -> Array:
+    return np.zeros(size) if value is None else finite_array(value, (size,), f"JerkLimited: {what}")

@@ -1,0 +1,104 @@
+"""The fastest turn within limits of velocity, acceleration and jerk."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from opspace.tasks.references.jerk_limited import JerkLimited
+from opspace.tasks.references.sample import Sample
+from opspace.tasks.rotation import as_rotation, cross, exp_rotation, log_rotation
+from opspace.tasks.validation import Array, finite
+
+_SERIES_BELOW = 1e-2
+"""Angle in rad below which series are more accurate than differences of near numbers."""
+
+
+class OrientationJerkLimited:
+    """Turns from start to rest at the goal the short way: R = exp([φ(t)]×) R_start.
+
+    φ is a `JerkLimited` motion in R³ from 0 to log(R_goal R_startᵀ), in world axes. With V the left
+    Jacobian of SO(3), ω = V(φ) φ̇ and ω̇ = V(φ) φ̈ + V̇ φ̇; at φ = 0 these are φ̇ and φ̈, so that
+    a turn on its way gets another goal without a step.
+
+    Args:
+        start: First orientation, (3, 3) rotation matrix or quaternion wxyz.
+        goal: Last orientation, in either form.
+        max_velocity: Limit of each coordinate of φ, rad/s.
+        max_acceleration: Limit, rad/s².
+        max_jerk: Limit, rad/s³.
+        start_time: Time at which it begins, s.
+        start_velocity: (3,) angular velocity at that time in world axes, rad/s; None is rest.
+        start_acceleration: (3,) angular acceleration at that time, rad/s²; None is none.
+
+    Attributes:
+        duration: Time of the turn, s.
+
+    Raises:
+        InputError: An orientation that is not a rotation, or a limit not above zero.
+    """
+
+    def __init__(
+        self,
+        start: ArrayLike,
+        goal: ArrayLike,
+        *,
+        max_velocity: float,
+        max_acceleration: float,
+        max_jerk: float,
+        start_time: float = 0.0,
+        start_velocity: ArrayLike | None = None,
+        start_acceleration: ArrayLike | None = None,
+    ) -> None:
+        self.start = as_rotation(start, "OrientationJerkLimited: start")
+        self.goal = as_rotation(goal, "OrientationJerkLimited: goal")
+        self.start_time = finite(start_time, "OrientationJerkLimited: start_time")
+        self._turn = JerkLimited(
+            np.zeros(3),
+            log_rotation(self.goal @ self.start.T),
+            max_velocity=max_velocity,
+            max_acceleration=max_acceleration,
+            max_jerk=max_jerk,
+            start_time=start_time,
+            start_velocity=start_velocity,
+            start_acceleration=start_acceleration,
+        )
+        self.duration = self._turn.duration
+
+    def __call__(self, t: float, /) -> Sample:
+        """Return the desired rotation matrix, angular velocity and acceleration at time t, s."""
+        phi, rate, curvature = self._turn(t)
+        omega, alpha = _angular(phi, rate, curvature)
+        R = self.goal if t - self.start_time >= self.duration else exp_rotation(phi) @ self.start
+        return Sample(R, omega, alpha)
+
+
+def _angular(phi: Array, rate: Array, curvature: Array) -> tuple[Array, Array]:
+    """Return ω = V φ̇ and ω̇ = V φ̈ + V̇ φ̇ with V = I + a [φ]× + b [φ]×²."""
+    a, b, a_rate, b_rate = _coefficients(math.sqrt(float(phi @ phi)), float(phi @ rate))
+    once, bent = cross(phi, rate), cross(phi, curvature)
+    twice = cross(phi, once)
+    omega = rate + a * once + b * twice
+    alpha = curvature + a * bent + b * cross(phi, bent)
+    alpha += a_rate * once + b_rate * twice + b * cross(rate, once)
+    return omega, alpha
+
+
+def _coefficients(angle: float, growth: float) -> tuple[float, float, float, float]:
+    """Return a = (1 − cos θ)/θ², b = (θ − sin θ)/θ³ and their rates, with growth = θ θ̇."""
+    square = angle * angle
+    if angle < _SERIES_BELOW:
+        a, b = 0.5 - square / 24.0, 1.0 / 6.0 - square / 120.0
+        return (
+            a,
+            b,
+            growth * (-1.0 / 12.0 + square / 180.0),
+            growth * (-1.0 / 60.0 + square / 1260.0),
+        )
+    sine, cosine = math.sin(angle), math.cos(angle)
+    a, b = (1.0 - cosine) / square, (angle - sine) / (square * angle)
+    a_rate = growth * (sine / angle - 2.0 * a) / square
+    b_rate = growth * (a - 3.0 * b) / square
+    return a, b, a_rate, b_rate
