@@ -7,15 +7,19 @@ import io
 import json
 import os
 import sys
+import time
 from collections.abc import Sequence
 from dataclasses import asdict
 from enum import Enum
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from opspace.errors import OpspaceError
+
+if TYPE_CHECKING:
+    from opspace.scenario.run import RunResult
 
 BAD_INPUT = 2
 INTERRUPTED = 130
@@ -153,6 +157,10 @@ def run(
     overwrite: Annotated[
         bool, typer.Option("--overwrite", help="Replace a recording that is already there.")
     ] = False,
+    requests: Annotated[
+        Path | None,
+        typer.Option(help="Ask for what was asked for in opspace view (RUN/requests.jsonl)."),
+    ] = None,
 ) -> None:
     """Simulate a scenario, record it and measure it."""
     from opspace.scenario import load_scenario
@@ -164,7 +172,12 @@ def run(
     out = out or Path("results") / Path(scenario).stem
     with ProgressBar() as progress:
         result = run_scenario(
-            loaded, out, title=Path(scenario).stem, progress=progress, overwrite=overwrite
+            loaded,
+            out,
+            title=Path(scenario).stem,
+            progress=progress,
+            overwrite=overwrite,
+            requests=requests,
         )
     if loaded.events:
         _print_table(*timeline_table(loaded.events, result.recording))
@@ -361,6 +374,83 @@ def check(
     print(f"\nbuffer: a direction is absent below {lower:g} and fully active above {upper:g}")
     for warning in report.warnings:
         print(f"warning: {warning}")
+
+
+@app.command(
+    epilog="Example: opspace view showpiece-panda; then: opspace view results/view/showpiece-panda-1"
+)
+def view(
+    what: Annotated[
+        str,
+        typer.Argument(
+            metavar="SCENARIO|RUN",
+            help="A scenario to run on the page, or the directory of a recording to look at.",
+        ),
+    ],
+    overrides: Overrides = None,
+    host: Annotated[
+        str, typer.Option(help="Address to listen at; 0.0.0.0 lets other machines in.")
+    ] = "127.0.0.1",
+    port: Annotated[int, typer.Option(help="Port; the next free one where it is in use.")] = 8080,
+    speed: Annotated[float, typer.Option(help="Seconds of the run per second.")] = 1.0,
+    duration: Annotated[float, typer.Option(help="Seconds after which the run ends.")] = 3600.0,
+    start: Annotated[
+        bool, typer.Option("--start", help="Begin at once, not when a browser opens the page.")
+    ] = False,
+    out: Annotated[
+        Path | None,
+        typer.Option(help="Directory to record to. [default: results/view/NAME-1, -2, ...]"),
+    ] = None,
+) -> None:
+    """Watch a run in a browser: live, with buttons to change it, or recorded."""
+    from opspace.record.format import HEADER
+    from opspace.scenario import load_scenario
+    from opspace.scenario.watch import next_directory, watch_scenario
+
+    if (Path(what) / HEADER).exists():
+        _view_recording(Path(what), host, port)
+        return
+    loaded = load_scenario(what, overrides or ())
+    begins = "now" if start else "when the page is open"
+    watch_scenario(
+        loaded,
+        out or next_directory(Path("results") / "view", Path(what).stem),
+        host=host,
+        port=port,
+        duration=duration,
+        speed=speed,
+        wait=not start,
+        opened=lambda address: print(
+            f"open {address}  (the run begins {begins}; Ctrl-C ends it)", flush=True
+        ),
+        ended=_stay,
+    )
+
+
+def _view_recording(run: Path, host: str, port: int) -> None:
+    from opspace.view.page import Page
+
+    page = Page(run, host, port, None)
+    print(f"open {page.address}  (Ctrl-C ends it)", flush=True)
+    try:
+        page.serve()
+    except KeyboardInterrupt:
+        page.close()
+
+
+def _stay(result: RunResult) -> None:
+    """Keep the page of a run that is over until somebody has seen enough."""
+    if result.outcome.reason:
+        print(f"ended at {result.outcome.t:.3f} s: {result.outcome.reason}")
+    print(f"results: {result.directory}")
+    if result.outcome.reason == "interrupted":
+        return
+    print("the page still shows the run; Ctrl-C closes it", flush=True)
+    try:
+        while True:
+            time.sleep(1.0)
+    except KeyboardInterrupt:
+        return
 
 
 @app.command(epilog="Example: opspace replay results/showpiece")

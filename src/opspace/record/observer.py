@@ -7,9 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
-from opspace.controller import Command, ReferenceController
+from opspace.controller import Command, LevelStatus, ReferenceController
 from opspace.errors import InputError
 from opspace.record.format import Column, Ended
+from opspace.record.subject import subject_of
 from opspace.record.writer import Recorder
 from opspace.tasks import Task
 
@@ -17,6 +18,12 @@ State = Callable[[], tuple[np.ndarray, np.ndarray]]
 """Tells a configuration (nq,) and a velocity (n,)."""
 
 _NOTHING = np.zeros(0)
+_NOWHERE = np.full(6, np.nan)
+_TWIST = {
+    **{axis: f"linear part along {axis}" for axis in "xyz"},
+    **{f"r{axis}": f"angular part about {axis}" for axis in "xyz"},
+}
+"""Axes of a direction in the world, and what they are."""
 
 
 def columns_of(
@@ -46,6 +53,11 @@ def columns_of(
     columns += [Column(f"tool/{a}", "m", f"{robot.tool} position, {a}") for a in "xyz"]
     for task in [*stack, *tasks]:
         columns.append(Column(f"tasks/{task.name}/activation", "1", f"activation of {task.name}"))
+        columns.append(
+            Column(
+                f"tasks/{task.name}/level", "1", "number of its level; on its way the mean of two"
+            )
+        )
         columns += [
             Column(f"tasks/{task.name}/error/{i}", unit, f"row {i}: desired minus actual")
             for i, unit in enumerate(task.units)
@@ -60,6 +72,10 @@ def columns_of(
         columns += [
             Column(f"{prefix}/activation/{k}", "1", f"activation of direction {k} of {names}")
             for k in range(size)
+        ]
+        columns += [
+            Column(f"{prefix}/weakest/{axis}", "1", f"weakest direction of {names}, {what}")
+            for axis, what in _TWIST.items()
         ]
     if stack.limits is not None:
         columns += [
@@ -118,33 +134,52 @@ class TickRecorder:
             if names.count(name) > 1:
                 raise InputError(f"two tasks to record are named {name!r}")
         levels = stack.levels_by_number if levels is None else levels
-        self._rows = {task.name: task.rows for task in [*stack, *tasks]}
+        self._tasks = {task.name: task for task in [*stack, *tasks]}
         self._levels = {number: _directions(controller, level) for number, level in levels.items()}
         self._truth = truth
         columns = columns_of(controller, tasks, levels)
         if truth is not None:
             columns += _truth_columns(controller)
-        self._recorder = Recorder(directory, columns, header, overwrite=overwrite)
+        about = {**subject_of(controller, tasks), **header}
+        self._recorder = Recorder(directory, columns, about, overwrite=overwrite)
 
     def observe(self, q: np.ndarray, v: np.ndarray, command: Command) -> None:
         """Write one tick."""
         controller = self._controller
         parts = [[command.t], q, v, command.tau, controller.robot.position(self._tool)]
-        for name, rows in self._rows.items():
-            found = command.tasks.get(name)
-            h, error = (np.nan, _NOTHING) if found is None else (found.activation, found.error)
-            parts += [[h], _padded(error, rows)]
+        found_tasks = command.tasks
+        for name, task in self._tasks.items():
+            found, rows = found_tasks.get(name), task.rows
+            if found is None:
+                parts += [[np.nan, np.nan], _padded(_NOTHING, rows)]
+            else:
+                level = sum(number * weight for number, weight in found.levels)
+                parts += [[found.activation, level], _padded(found.error, rows)]
         levels = {level.level: level for level in command.levels}
         for number, size in self._levels.items():
             level = levels.get(number)
             sigma, h = (_NOTHING, _NOTHING) if level is None else (level.sigma, level.activation)
-            parts += [_padded(sigma, size), _padded(h, size)]
+            weakest = _NOWHERE if level is None else self._weakest(level)
+            parts += [_padded(sigma, size), _padded(h, size), weakest]
         if controller.stack.limits is not None:
-            parts.append([command.limits.get(s.name, 0.0) for s in controller.stack.limits.sides])
+            # Worked out anew each time it is asked for.
+            limits = command.limits
+            parts.append([limits.get(s.name, 0.0) for s in controller.stack.limits.sides])
         parts.append([float(command.hard_solves), float(command.status)])
         if self._truth is not None:
             parts += self._truth()
         self._recorder.append(np.concatenate(parts))
+
+    def _weakest(self, level: LevelStatus) -> np.ndarray:
+        """Return the direction that a level would lose first, as a motion in the world, (6,)."""
+        if not level.sigma.size or not all(name in self._tasks for name in level.tasks):
+            return _NOWHERE
+        robot = self._controller.robot
+        axes = [self._tasks[name].row_axes(robot) for name in level.tasks]
+        known = [rows for rows in axes if rows is not None]
+        if len(known) < len(axes):
+            return _NOWHERE
+        return level.directions[:, int(np.argmin(level.sigma))] @ np.vstack(known)
 
     def close(self, how: Ended = "completed", reason: str = "") -> None:
         """Finish the recording and say how the run ended."""

@@ -13,6 +13,7 @@ from opspace.record import load
 from opspace.scenario.build import build
 from opspace.scenario.load import load_scenario
 from opspace.scenario.run import SCENARIO
+from opspace.sim.requests import FILE, Changes, RequestPlayer
 
 
 @dataclass(frozen=True)
@@ -62,8 +63,13 @@ def replay(directory: Path) -> Replay:
     gap, gap_at = 0.0, 0.0
     count = {status: 0 for status in Status if status}
     first: dict[str, float] = {}
+    changes = Changes(built.controller, built.tasks.values())
+    asked = directory / FILE
+    again = RequestPlayer(changes, asked) if asked.exists() else None
     for t, q_now, v_now, tau_then in zip(recording.t.tolist(), q, v, tau, strict=True):
         command = built.controller.step(t, q_now, v_now)
+        if again is not None:
+            again.observe(q_now, v_now, command)
         difference = float(np.max(np.abs(command.tau - tau_then)))
         if difference > gap:
             gap, gap_at = difference, t

@@ -16,6 +16,8 @@ from opspace.scenario.progress import ProgressBar
 from opspace.scenario.references import return_time
 from opspace.scenario.schema import Scenario
 from opspace.sim import Observer, Outcome, Plant, simulate
+from opspace.sim.requests import FILE, Changes, RequestPlayer
+from opspace.tasks import Task
 
 METRICS = "metrics.json"
 SCENARIO = "scenario.yaml"
@@ -45,6 +47,7 @@ def run_scenario(
     title: str = "run",
     progress: ProgressBar | None = None,
     overwrite: bool = False,
+    requests: Path | None = None,
 ) -> RunResult:
     """Simulate a scenario, record every tick and measure the run.
 
@@ -54,34 +57,80 @@ def run_scenario(
         title: What the progress bar calls it.
         progress: Bar that gets a line for this run.
         overwrite: Replace a recording that is already there.
+        requests: File of requests of a run that was watched, to be asked for again.
 
     Returns:
         What the run left behind.
 
     Raises:
         ScenarioError: The scenario does not fit its robot.
-        RecordingError: There is a recording already, or the directory cannot be written.
+        RecordingError: There is a recording already, the directory cannot be written, or the
+            requests cannot be read.
     """
     built = build(scenario)
-    header = {"scenario": to_dict(scenario), "seed": scenario.seed, "dt": scenario.dt}
+    watching: list[Observer] = []
+    asked = None
+    if requests is not None:
+        watching.append(RequestPlayer(Changes(built.controller, built.tasks.values()), requests))
+        asked = requests.read_bytes()
     recorder = TickRecorder(
         out,
         built.controller,
-        header,
-        tasks=[built.tasks[name] for name in scenario.tasks if name in late_tasks(scenario.events)],
-        levels={
-            number: [built.tasks[name] for name in names]
-            for number, names in levels_visited(scenario.events, scenario.tasks).items()
-        },
-        truth=_truth(built.plant),
+        header_of(scenario),
+        tasks=late_tasks_of(built),
+        levels=recorded_levels(built, everywhere=requests is not None),
+        truth=truth_of(built.plant),
         overwrite=overwrite,
     )
-    (out / METRICS).unlink(missing_ok=True)
-    (out / SCENARIO).write_text(dump_scenario(scenario), encoding="utf-8")
+    begin(out, scenario)
+    (out / FILE).unlink(missing_ok=True)
+    if asked is not None:
+        (out / FILE).write_bytes(asked)
     line = progress.run(title, scenario.duration) if progress else None
-    outcome = _simulate(built, recorder, [line] if line else [])
+    outcome = _simulate(built, recorder, [*watching, *([line] if line else [])])
     if line:
         line.finish(outcome.t)
+    return result_of(scenario, out, outcome)
+
+
+def header_of(scenario: Scenario) -> dict[str, object]:
+    """Return what the recording of a scenario says about itself."""
+    return {"scenario": to_dict(scenario), "seed": scenario.seed, "dt": scenario.dt}
+
+
+def late_tasks_of(built: Built) -> list[Task]:
+    """List the tasks that are not in the stack at the start."""
+    late = late_tasks(built.scenario.events)
+    return [task for name, task in built.tasks.items() if name in late]
+
+
+def recorded_levels(built: Built, *, everywhere: bool) -> dict[float, list[Task]]:
+    """List, by number of the level, the tasks to record there.
+
+    Args:
+        built: The scenario.
+        everywhere: Whether any task may come to any level, as when somebody asks for it.
+    """
+    visited = levels_visited(built.scenario.events, built.scenario.tasks)
+    return {
+        number: list(built.tasks.values()) if everywhere else [built.tasks[name] for name in names]
+        for number, names in visited.items()
+    }
+
+
+def truth_of(plant: Plant) -> State | None:
+    """Return what tells the true state where the sensors are noisy."""
+    return (lambda: (plant.q, plant.v)) if plant.noisy else None
+
+
+def begin(out: Path, scenario: Scenario) -> None:
+    """Put the scenario beside a recording that begins; the numbers of another one go."""
+    (out / METRICS).unlink(missing_ok=True)
+    (out / SCENARIO).write_text(dump_scenario(scenario), encoding="utf-8")
+
+
+def result_of(scenario: Scenario, out: Path, outcome: Outcome) -> RunResult:
+    """Measure a run that is over, and write the numbers beside its recording."""
     recording = load(out)
     metrics = measure(
         recording,
@@ -90,10 +139,6 @@ def run_scenario(
     )
     write_json(out / METRICS, metrics.to_json())
     return RunResult(out, outcome, recording, metrics)
-
-
-def _truth(plant: Plant) -> State | None:
-    return (lambda: (plant.q, plant.v)) if plant.noisy else None
 
 
 def limited_joint(scenario: Scenario) -> str | None:

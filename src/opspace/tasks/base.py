@@ -101,6 +101,18 @@ class Task(ABC):
     def reset(self) -> None:  # noqa: B027 - most tasks remember nothing
         """Forget what was remembered from earlier ticks, such as a held start value."""
 
+    def row_axes(self, robot: Robot) -> Array | None:
+        """Return the motion in world axes that each row is about, to be drawn.
+
+        Args:
+            robot: The robot given to ``bind``, updated.
+
+        Returns:
+            (m, 6) rows linear then angular, or None where the rows are about something else.
+        """
+        del robot
+        return None
+
     @property
     def kp(self) -> float | Array:
         """Stiffness, 1/s²: a number for all rows or (m,). May be assigned at any time."""

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from opspace.errors import InputError
 from opspace.tasks.base import TaskTerms
-from opspace.tasks.motions import Motion, MotionSource
+from opspace.tasks.motions import Motion, MotionSource, RelativeFrame
 from opspace.tasks.quantities import Quantity
 from opspace.tasks.references.sample import Reference, Sample
 from opspace.tasks.rotation import cross
@@ -100,6 +100,18 @@ class MotionTask(TrackingTask):
     def desired(self, robot: Robot, t: float) -> Sample:
         """See `TrackingTask.desired`."""
         return self._desired(t, lambda: self.quantity.value(self.source.measure(robot)))
+
+    def row_axes(self, robot: Robot) -> Array | None:
+        """See `Task.row_axes`; None for what is seen from another frame."""
+        if isinstance(self.source, RelativeFrame):
+            return None
+        axes = self.selection
+        if self.in_tool_axes:
+            R = self.source.measure(robot).rotation
+            axes = axes @ _tool_axes(R)[: axes.shape[1], : axes.shape[1]]
+        found = np.zeros((self.rows, 6))
+        found[:, self.quantity.block] = axes
+        return found
 
     def reset(self) -> None:
         """Forget the held start value and which way round a rotation error went."""

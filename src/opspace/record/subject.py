@@ -1,0 +1,87 @@
+"""What a recording says about the robot and the tasks it is about, for those who look at it later."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from opspace.controller import ReferenceController
+from opspace.robots.catalogue import CATALOGUE, locate
+from opspace.robots.protocol import Robot
+from opspace.tasks import Task
+from opspace.tasks.leading import can_be_led
+from opspace.tasks.motion_task import MotionTask
+from opspace.tasks.motions import CenterOfMass
+from opspace.tasks.quantities import Orientation, Position
+
+
+def subject_of(controller: ReferenceController, tasks: Sequence[Task] = ()) -> dict[str, Any]:
+    """Describe robot and tasks in JSON's own types.
+
+    Args:
+        controller: The controller that is recorded.
+        tasks: Tasks that are not in its stack yet.
+
+    Returns:
+        ``robot`` (name or file, joints, their limits in rad or m, torque limits in N·m, the buffer
+        before a limit in rad or m, and by limit the acceleration that its joint brakes with; null
+        where there is none) and ``tasks`` (units, stiffness, level, and what its target can be led
+        to).
+    """
+    stack = controller.stack
+    found = {
+        task.name: _task(task, number)
+        for number, level in stack.levels_by_number.items()
+        for task in level
+    }
+    found.update({task.name: _task(task, None) for task in tasks})
+    return {"robot": _robot(controller), "tasks": found}
+
+
+def _robot(controller: ReferenceController) -> dict[str, Any]:
+    robot, limits = controller.robot, controller.stack.limits
+    lower, upper = np.array(robot.q_lower), np.array(robot.q_upper)
+    for side in limits.sides if limits is not None else ():
+        (upper if side.sign > 0 else lower)[side.index] = side.limit
+    return {
+        "name": robot.name,
+        "file": None if _has_name(robot) else str(robot.source),
+        "floating_base": robot.floating_base,
+        "locked_joints": list(robot.locked_joints),
+        "tool": robot.tool,
+        "joints": list(robot.joint_names),
+        "lower": _finite(lower),
+        "upper": _finite(upper),
+        "torque_limit": _finite(robot.torque_limit),
+        "buffer": limits.buffer if limits is not None and limits.mode == "buffer" else None,
+        "brake": {side.name: side.brake for side in limits.sides} if limits is not None else {},
+    }
+
+
+def _has_name(robot: Robot) -> bool:
+    entry = CATALOGUE.get(robot.name)
+    return entry is not None and locate(entry) == robot.source
+
+
+def _task(task: Task, level: float | None) -> dict[str, Any]:
+    return {
+        "units": list(task.units),
+        "kp": np.asarray(task.kp).tolist(),
+        "level": level,
+        "led_by": _led_by(task),
+        "frame": getattr(task.source, "frame", None) if isinstance(task, MotionTask) else None,
+        "center_of_mass": isinstance(task, MotionTask) and isinstance(task.source, CenterOfMass),
+    }
+
+
+def _led_by(task: Task) -> list[str]:
+    if not isinstance(task, MotionTask) or not can_be_led(task):
+        return []
+    one = {Position: ["position"], Orientation: ["orientation"]}
+    return one.get(type(task.quantity), ["position", "orientation"])
+
+
+def _finite(values: np.ndarray) -> list[float | None]:
+    return [float(value) if np.isfinite(value) else None for value in values]

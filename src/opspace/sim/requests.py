@@ -1,0 +1,277 @@
+"""What is asked of a run while it goes on: applied between two ticks, written down, repeatable."""
+
+from __future__ import annotations
+
+import json
+from collections import deque
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, fields
+from pathlib import Path
+from types import MappingProxyType
+from typing import IO, Any
+
+import numpy as np
+
+from opspace.controller import Command, ReferenceController
+from opspace.errors import InputError, OpspaceError, RecordingError, unknown_name
+from opspace.law import Profile
+from opspace.tasks import Task
+from opspace.tasks.leading import lead
+
+KINDS: Mapping[str, frozenset[str]] = MappingProxyType(
+    {
+        "insert": frozenset({"level", "duration"}),
+        "remove": frozenset({"duration"}),
+        "move": frozenset({"level", "duration"}),
+        "swap": frozenset({"duration"}),
+        "lead": frozenset({"position", "orientation"}),
+        "gain": frozenset({"kp", "duration"}),
+    }
+)
+"""What can be asked for, and what each takes beside its tasks."""
+
+FILE = "requests.jsonl"
+"""Name of the file beside a recording that tells what was asked for during the run."""
+
+_NEEDED = {"insert": "level", "move": "level", "gain": "kp"}
+
+
+@dataclass(frozen=True)
+class RunRequest:
+    """One change asked for during a run.
+
+    Attributes:
+        kind: One of `KINDS`.
+        tasks: Name of the task, or of the two that swap.
+        level: Number of the level, for insert and move.
+        duration: How long it takes, s; not for lead, which takes as long as its way.
+        position: (3,) where to lead to, m.
+        orientation: Quaternion wxyz to lead to.
+        kp: Stiffness to come to, 1/s².
+
+    Raises:
+        InputError: Something that this kind does not take, or lacks.
+        UnknownNameError: There is no such kind.
+    """
+
+    kind: str
+    tasks: tuple[str, ...]
+    level: float | None = None
+    duration: float | None = None
+    position: tuple[float, ...] | None = None
+    orientation: tuple[float, ...] | None = None
+    kp: float | None = None
+
+    def __post_init__(self) -> None:
+        if self.kind not in KINDS:
+            raise unknown_name("request", self.kind, KINDS)
+        many = 2 if self.kind == "swap" else 1
+        if len(self.tasks) != many:
+            raise InputError(f"request {self.kind!r} takes {many} task(s), not {list(self.tasks)}")
+        given = {f.name for f in fields(self)[2:] if getattr(self, f.name) is not None}
+        if wrong := sorted(given - KINDS[self.kind]):
+            raise InputError(f"request {self.kind!r} does not take {', '.join(wrong)}")
+        if (needed := _NEEDED.get(self.kind)) and needed not in given:
+            raise InputError(f"request {self.kind!r} needs {needed}")
+
+    @classmethod
+    def read(cls, content: Mapping[str, Any]) -> RunRequest:
+        """Read a request from JSON's own types.
+
+        Args:
+            content: The attributes by name; lists for tuples.
+
+        Returns:
+            The request.
+
+        Raises:
+            InputError: Not a request.
+            UnknownNameError: A kind that there is not.
+        """
+        known = [f.name for f in fields(cls)]
+        for key in content:
+            if key not in known:
+                raise InputError(f"a request has no {key!r} (valid: {', '.join(known)})")
+        try:
+            values: dict[str, Any] = {
+                key: tuple(value) if isinstance(value, list) else value
+                for key, value in content.items()
+            }
+            return cls(**values)
+        except TypeError as error:
+            raise InputError(f"this is no request: {error}") from None
+
+    def plain(self) -> dict[str, Any]:
+        """Return the request in JSON's own types, without what is not given."""
+        values = {f.name: getattr(self, f.name) for f in fields(self)}
+        plain = {k: list(v) if isinstance(v, tuple) else v for k, v in values.items()}
+        return {key: value for key, value in plain.items() if value is not None}
+
+
+@dataclass(frozen=True)
+class _GainRamp:
+    """A stiffness on its way; a step in it would be a step in the torque."""
+
+    start: Any
+    goal: float
+    begin: float
+    duration: float
+
+    def at(self, t: float) -> Any:
+        part = 1.0 if self.duration <= 0.0 else (t - self.begin) / self.duration
+        return self.start + (self.goal - self.start) * Profile("quintic")(part).value
+
+    def over(self, t: float) -> bool:
+        return t >= self.begin + self.duration
+
+
+class Changes:
+    """Applies requests to the tasks of a controller, for the thread that ticks.
+
+    Args:
+        controller: The controller.
+        tasks: The tasks that requests may name; those in the stack are known anyway.
+    """
+
+    def __init__(self, controller: ReferenceController, tasks: Iterable[Task] = ()) -> None:
+        self._controller = controller
+        self._tasks = {task.name: task for task in [*tasks, *controller.stack]}
+        self._ramps: dict[str, _GainRamp] = {}
+
+    def apply(self, request: RunRequest, t: float) -> None:
+        """Do what is asked for; it takes effect with the next tick.
+
+        Args:
+            request: The request.
+            t: Time of the present tick, s.
+
+        Raises:
+            OpspaceError: It cannot be done.
+        """
+        stack = self._controller.stack
+        task = self._task(request.tasks[0])
+        duration = 0.5 if request.duration is None else request.duration
+        match request.kind:
+            case "insert":
+                assert request.level is not None
+                stack.insert(task, request.level, duration)
+            case "remove":
+                stack.remove(task, duration)
+            case "move":
+                assert request.level is not None
+                stack.move(task, request.level, duration)
+            case "swap":
+                stack.swap(task, self._task(request.tasks[1]), duration)
+            case "lead":
+                place = {"position": request.position, "orientation": request.orientation}
+                lead(task, self._controller.robot, t, **place)
+            case _:
+                self._change_gain(task, request.kp, t, duration)
+
+    def follow(self, t: float) -> None:
+        """Move on what takes time: the gains on their way at time ``t`` [s]."""
+        for name, ramp in list(self._ramps.items()):
+            self._tasks[name].kp = ramp.at(t)
+            if ramp.over(t):
+                del self._ramps[name]
+
+    def _change_gain(self, task: Task, kp: float | None, t: float, duration: float) -> None:
+        start, assigned = task.kp, np.asarray(kp, dtype=float)
+        if assigned.ndim or not np.isfinite(assigned) or assigned < 0.0:
+            raise InputError(f"task {task.name!r}: kp must be a number of at least 0, not {kp!r}")
+        if not (np.isfinite(duration) and duration >= 0.0):
+            raise InputError(f"the duration must be finite and >= 0 s, got {duration!r}")
+        self._ramps[task.name] = _GainRamp(start, float(assigned), t, duration)
+
+    def _task(self, name: str) -> Task:
+        try:
+            return self._tasks[name]
+        except KeyError:
+            raise unknown_name("task", name, self._tasks) from None
+
+
+class RequestDesk:
+    """The observer that takes requests from other threads, and writes down what it did and when.
+
+    Args:
+        changes: What applies them.
+        log: File to write them to, one JSON object per line with the time ``at``; None for none.
+        answer: Told about every request, with the reason where it was refused.
+    """
+
+    def __init__(
+        self,
+        changes: Changes,
+        log: Path | None = None,
+        answer: Callable[[RunRequest, str], None] = lambda request, reason: None,
+    ) -> None:
+        self._changes = changes
+        self._waiting: deque[RunRequest] = deque()
+        self._log: IO[str] | None = log.open("w", encoding="utf-8") if log else None
+        self._answer = answer
+
+    def ask(self, request: RunRequest) -> None:
+        """Put a request on the desk, from any thread; it is dealt with after the running tick."""
+        self._waiting.append(request)
+
+    def observe(self, q: np.ndarray, v: np.ndarray, command: Command) -> None:
+        """Deal with what lies on the desk."""
+        del q, v
+        while self._waiting:
+            self._deal(self._waiting.popleft(), command.t)
+        self._changes.follow(command.t)
+
+    def close(self) -> None:
+        """Close the log."""
+        if self._log is not None:
+            self._log.close()
+
+    def _deal(self, request: RunRequest, t: float) -> None:
+        try:
+            self._changes.apply(request, t)
+        except OpspaceError as error:
+            self._answer(request, str(error))
+            return
+        if self._log is not None:
+            self._log.write(json.dumps({"at": t, **request.plain()}, ensure_ascii=False) + "\n")
+            self._log.flush()
+        self._answer(request, "")
+
+
+class RequestPlayer:
+    """The observer that asks for the same again, at the same ticks.
+
+    Args:
+        changes: What applies them.
+        log: File that a `RequestDesk` wrote.
+
+    Raises:
+        RecordingError: The file cannot be read, or holds something else.
+    """
+
+    def __init__(self, changes: Changes, log: Path) -> None:
+        self._changes = changes
+        self._coming = deque(_read(log))
+
+    def observe(self, q: np.ndarray, v: np.ndarray, command: Command) -> None:
+        """Ask for what was asked for at this tick."""
+        del q, v
+        while self._coming and self._coming[0][0] <= command.t:
+            self._changes.apply(self._coming.popleft()[1], command.t)
+        self._changes.follow(command.t)
+
+
+def _read(log: Path) -> list[tuple[float, RunRequest]]:
+    try:
+        lines = log.read_text(encoding="utf-8").splitlines()
+    except (OSError, UnicodeDecodeError) as error:
+        raise RecordingError(f"{log} cannot be read: {error}") from error
+    found: list[tuple[float, RunRequest]] = []
+    for number, line in enumerate(lines, start=1):
+        try:
+            content = json.loads(line)
+            at = float(content.pop("at"))
+            found.append((at, RunRequest.read(content)))
+        except (OpspaceError, ValueError, TypeError, AttributeError, KeyError) as error:
+            raise RecordingError(f"{log}:{number} is no request: {error}") from None
+    return found

@@ -1,0 +1,3 @@
+"""Look at a run in a browser, while it goes on or later."""
+
+from opspace.view.viewer import Viewer as Viewer

@@ -1,0 +1,73 @@
+"""The process of a page: it reads the recording from the disk, so that a run never waits for it.
+
+Messages go line by line as JSON: to the run on the standard output, from it on the standard input.
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import json
+import os
+import sys
+import time
+from pathlib import Path
+from threading import Lock, Thread
+from typing import Any
+
+from opspace.errors import OpspaceError
+from opspace.view.controls import Ask
+from opspace.view.page import PICTURES, Page
+
+
+def main() -> None:
+    """Serve a page until the run that started it says goodbye."""
+    parser = argparse.ArgumentParser(prog="python -m opspace.view")
+    parser.add_argument("directory", type=Path)
+    parser.add_argument("--host", required=True)
+    parser.add_argument("--port", type=int, required=True)
+    given = parser.parse_args()
+    say = _speaker()
+    try:
+        page = Page(given.directory, given.host, given.port, say)
+    except (OpspaceError, OSError) as error:
+        say({"failed": f"{type(error).__name__}: {error}"})
+        sys.exit(2)
+    page.on_visit(lambda: say({"visited": True}))
+    say({"address": page.address})
+    closed: list[bool] = []
+    Thread(target=_listen, args=(page, closed), daemon=True).start()
+    while not closed:
+        page.show()
+        time.sleep(1.0 / PICTURES)
+    page.close()
+
+
+def _speaker() -> Ask:
+    """Take the standard output for messages; whoever else prints does so on the error stream."""
+    stream = os.fdopen(os.dup(sys.stdout.fileno()), "w", encoding="utf-8")
+    os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
+    lock = Lock()
+
+    def say(message: dict[str, Any]) -> None:
+        # Without a reader the run is gone; the page notices it at its standard input.
+        with lock, contextlib.suppress(BrokenPipeError):
+            stream.write(json.dumps(message) + "\n")
+            stream.flush()
+
+    return say
+
+
+def _listen(page: Page, closed: list[bool]) -> None:
+    """Pass on what the run says, until it is gone."""
+    for line in sys.stdin:
+        message = json.loads(line)
+        if message.get("ended"):
+            page.end()
+        else:
+            page.answer(message["answer"], message["reason"])
+    closed.append(True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,73 @@
+"""Torques and singular values over the last seconds, as charts that scroll."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import viser
+from viser import uplot
+
+from opspace.view.frame import FrameReader
+
+SECONDS = 8.0
+"""How much of the past the charts show."""
+
+POINTS = 240
+HEIGHT = 210
+
+# Paul Tol's muted scheme, as in the figures.
+COLORS = (
+    "#332288", "#44AA99", "#CC6677", "#999933", "#66B5E0", "#882255", "#117733", "#CBB34D", "#AA4499",
+)  # fmt: skip
+
+
+class Chart:
+    """Columns over time.
+
+    Args:
+        server: The server of the page.
+        reader: Where the numbers come from.
+        title: What the chart shows, with its unit.
+        columns: Names of the columns by their label.
+    """
+
+    def __init__(
+        self, server: viser.ViserServer, reader: FrameReader, title: str, columns: dict[str, str]
+    ) -> None:
+        self._reader, self._columns = reader, list(columns.values())
+        series = [uplot.Series(label="time [s]")]
+        for i, label in enumerate(columns):
+            color = COLORS[i % len(COLORS)]
+            series.append(uplot.Series(label=label, stroke=color, width=1.5))
+        self._handle = server.gui.add_uplot(
+            data=self._data(0),
+            series=tuple(series),
+            title=title,
+            scales={"x": uplot.Scale(time=False), "y": uplot.Scale(auto=True)},
+            legend=uplot.Legend(show=True),
+            height=HEIGHT,
+        )
+
+    def show(self, row: int) -> None:
+        """Show the time before a tick."""
+        self._handle.data = self._data(row)
+
+    def _data(self, row: int) -> tuple[np.ndarray, ...]:
+        history = self._reader.history(row, SECONDS, POINTS, self._columns)
+        return tuple(history.T.copy())
+
+
+def torque_columns(reader: FrameReader) -> dict[str, str]:
+    """List the torques by the name of the joint."""
+    return {name: f"tau/{name}" for name in reader.joints}
+
+
+def sigma_columns(reader: FrameReader) -> dict[str, str]:
+    """List the weakest singular value of every level that has directions in the world."""
+    found = {}
+    for level in reader.at(0).levels if len(reader.recording.data) else ():
+        if not math.isnan(level.weakest[0]):
+            prefix = f"levels/{level.number:g}/sigma"
+            found[f"level {level.number:g}"] = reader.recording.group(prefix)[-1]
+    return found

@@ -1,0 +1,169 @@
+"""One tick of a recording as the page shows it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from opspace.record.growing import GrowingRecording
+
+
+@dataclass(frozen=True)
+class TaskFrame:
+    """A task at one tick.
+
+    Attributes:
+        name: Its name.
+        activation: 0 to 1; nan while it is not in the stack.
+        level: Number of its level; between two while it moves.
+        error: (m,) desired minus actual.
+    """
+
+    name: str
+    activation: float
+    level: float
+    error: np.ndarray
+
+    @property
+    def present(self) -> bool:
+        """Whether it is in the stack."""
+        return not math.isnan(self.activation)
+
+
+@dataclass(frozen=True)
+class LevelFrame:
+    """A level at one tick.
+
+    Attributes:
+        number: Its number.
+        sigma: (k,) eigenvalues of Eq. 25, strongest first.
+        activation: (k,) activation of the directions.
+        weakest: (6,) the last of them as a motion in the world, nan where it cannot be drawn.
+    """
+
+    number: float
+    sigma: np.ndarray
+    activation: np.ndarray
+    weakest: np.ndarray
+
+
+@dataclass(frozen=True)
+class Frame:
+    """One tick.
+
+    Attributes:
+        t: Time, s.
+        q: (nq,) configuration, rad.
+        v: (n,) velocity, rad/s.
+        tau: (n,) torque, N·m.
+        tasks: The tasks.
+        levels: The levels, most important first.
+        limits: Activation of the joint limits by name.
+        status: Flags of the command.
+    """
+
+    t: float
+    q: np.ndarray
+    v: np.ndarray
+    tau: np.ndarray
+    tasks: tuple[TaskFrame, ...]
+    levels: tuple[LevelFrame, ...]
+    limits: dict[str, float]
+    status: int
+
+
+class FrameReader:
+    """Reads ticks of a recording.
+
+    Args:
+        recording: The recording.
+
+    Raises:
+        InputError: It has no states or torques.
+    """
+
+    def __init__(self, recording: GrowingRecording) -> None:
+        self.recording = recording
+        self._t, self._status = recording.columns(["t", "status"])
+        self._q, self._v, self._tau = (
+            recording.columns(recording.group(name)) for name in ("q", "v", "tau")
+        )
+        limits = recording.group("limits")
+        self._limits = {name.removeprefix("limits/"): recording.index[name] for name in limits}
+        self._tasks = {name: self._task(name) for name in _names(recording, "tasks")}
+        self._levels = {float(name): self._level(name) for name in _names(recording, "levels")}
+
+    @property
+    def joints(self) -> list[str]:
+        """Names of the joints."""
+        return [name.removeprefix("v/") for name in self.recording.group("v")]
+
+    def at(self, row: int) -> Frame:
+        """Read one tick.
+
+        Args:
+            row: Which, from 0.
+
+        Returns:
+            The tick.
+        """
+        values = np.array(self.recording.data[row])
+        tasks = [
+            TaskFrame(name, float(values[h]), float(values[level]), values[error])
+            for name, (h, level, error) in self._tasks.items()
+        ]
+        return Frame(
+            t=float(values[self._t]),
+            q=values[self._q],
+            v=values[self._v],
+            tau=values[self._tau],
+            tasks=tuple(tasks),
+            levels=tuple(
+                LevelFrame(number, *(values[part] for part in parts))
+                for number, parts in self._levels.items()
+            ),
+            limits={name: float(values[place]) for name, place in self._limits.items()},
+            status=int(values[self._status]),
+        )
+
+    def row_at(self, t: float) -> int:
+        """Find the tick next to a time [s]."""
+        times = self.recording.data[:, self._t]
+        return int(np.clip(np.searchsorted(times, t), 0, max(len(times) - 1, 0)))
+
+    def history(self, row: int, seconds: float, points: int, names: list[str]) -> np.ndarray:
+        """Read columns over the time before a tick.
+
+        Args:
+            row: The last tick.
+            seconds: How long before it [s].
+            points: How many ticks at most.
+            names: The columns.
+
+        Returns:
+            (k, 1 + number of columns) with the time first [s].
+        """
+        data = self.recording.data
+        first = self.row_at(float(data[row, self._t]) - seconds)
+        stride = max(1, (row - first) // points)
+        shown = np.arange(row, first - 1, -stride)[::-1]
+        return np.array(data[shown])[:, [self._t, *self.recording.columns(names)]]
+
+    def _task(self, name: str) -> tuple[int, int, list[int]]:
+        recording = self.recording
+        h, level = recording.columns([f"tasks/{name}/activation", f"tasks/{name}/level"])
+        return h, level, recording.columns(recording.group(f"tasks/{name}/error"))
+
+    def _level(self, number: str) -> tuple[list[int], list[int], list[int]]:
+        recording, prefix = self.recording, f"levels/{number}"
+        sigma, activation, weakest = (
+            recording.columns(recording.group(f"{prefix}/{part}"))
+            for part in ("sigma", "activation", "weakest")
+        )
+        return sigma, activation, weakest
+
+
+def _names(recording: GrowingRecording, group: str) -> list[str]:
+    return list(dict.fromkeys(name.split("/")[1] for name in recording.group(group)))

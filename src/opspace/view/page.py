@@ -1,0 +1,184 @@
+"""The page: one recording, drawn again and again from its newest or its chosen tick."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from opspace.errors import InputError, missing_extra
+from opspace.record.growing import GrowingRecording
+from opspace.robots import Robot, load_robot
+
+try:
+    import viser
+except ImportError:
+    raise missing_extra("viser", "view") from None
+
+from opspace.view import panels
+from opspace.view.charts import Chart, sigma_columns, torque_columns
+from opspace.view.controls import Ask, RunControls, StackControls
+from opspace.view.frame import FrameReader
+from opspace.view.scene import Scene
+
+PICTURES = 25.0
+"""Pictures per second."""
+
+CHARTS = 5.0
+"""Charts per second."""
+
+_WIDTH = 340.0
+_TRAIL_SECONDS = 4.0
+
+
+class Page:
+    """A web page that shows a recording, which may still be growing.
+
+    Args:
+        directory: The recording.
+        host: Address to listen at; 127.0.0.1 lets nobody in from outside.
+        port: Port to listen at; the next free one is taken where it is in use.
+        ask: Takes messages to the run that writes the recording; None where it is over.
+
+    Raises:
+        MissingExtraError: The viewer is not installed.
+        RecordingError: There is no recording.
+        InputError: The recording lacks what a page shows.
+    """
+
+    def __init__(self, directory: Path, host: str, port: int, ask: Ask | None) -> None:
+        recording = GrowingRecording(directory)
+        if not {"robot", "tasks"} <= recording.header.keys():
+            raise InputError(f"{directory} does not say what it is about; record it again")
+        self._reader = FrameReader(recording)
+        self._about = recording.header
+        # It greets on the standard output, which belongs to whoever started the page.
+        with contextlib.redirect_stdout(io.StringIO()):
+            self._server = viser.ViserServer(host, port, label="opspace", verbose=False)
+        self._controls: StackControls | None = None
+        self._build(directory, ask)
+        self._scene = Scene(
+            self._server,
+            _robot(self._about["robot"]),
+            self._about["tasks"],
+            None if ask is None else self._drag,
+        )
+        self._ask = ask
+        self._charted = self._drawn = 0.0
+        self._shown: tuple[int, bool] | None = None
+
+    @property
+    def address(self) -> str:
+        """Where a browser finds the page."""
+        host = self._server.get_host()
+        here = "localhost" if host in ("127.0.0.1", "0.0.0.0") else host
+        return f"http://{here}:{self._server.get_port()}"
+
+    def on_visit(self, call: Callable[[], None]) -> None:
+        """Call a function whenever a browser opens the page."""
+        self._server.on_client_connect(lambda client: call())
+
+    def answer(self, what: str, reason: str) -> None:
+        """Show what became of a request."""
+        if self._controls is not None:
+            self._controls.answer(what, reason)
+
+    def end(self) -> None:
+        """Tell the page that the run is over; what was recorded can still be looked at."""
+        self._ask = None
+        self._run.end()
+
+    def show(self) -> None:
+        """Draw one picture, if there is something new to see."""
+        now = time.monotonic()
+        rows = self._reader.recording.refresh()
+        if rows == 0:
+            return
+        times = self._reader.recording.data[:, 0]
+        if self._ask is None and not self._run.paused and self._drawn:
+            self._run.time += self._run.speed * (now - self._drawn)
+        self._drawn = now
+        self._run.show(float(times[0]), float(times[-1]))
+        row = rows - 1 if self._run.follows else self._reader.row_at(self._run.time)
+        state = (row, self._run.follows)
+        if state != self._shown:
+            with self._server.atomic():
+                self._draw(row, now)
+            self._shown = state
+
+    def serve(self) -> None:
+        """Draw pictures until the process is interrupted."""
+        while True:
+            self.show()
+            time.sleep(1.0 / PICTURES)
+
+    def close(self) -> None:
+        """Stop listening."""
+        self._server.stop()
+
+    def _draw(self, row: int, now: float) -> None:
+        frame = self._reader.at(row)
+        tool = self._reader.recording.group("tool")
+        trail = self._reader.history(row, _TRAIL_SECONDS, 80, tool)[:, 1:]
+        live = self._ask is not None and self._run.follows
+        self._scene.show(frame, trail, live)
+        self._head.content = panels.head(frame, self._note(live))
+        self._bars.content = panels.tasks(frame)
+        if now - self._charted >= 1.0 / CHARTS or self._run.paused:
+            self._charted = now
+            self._joints.content = panels.joints(frame, self._reader.joints, self._about["robot"])
+            for chart in self._charts:
+                chart.show(row)
+
+    def _note(self, live: bool) -> str:
+        if self._ask is None:
+            return "recorded" if self._reader.recording.ended else "the run is gone"
+        if self._run.paused:
+            return "paused"
+        return "live" if live else "live, looking back"
+
+    def _build(self, directory: Path, ask: Ask | None) -> None:
+        gui = self._server.gui
+        gui.configure_theme(show_logo=False, show_share_button=False, brand_color=(0, 68, 136))
+        gui.set_panel_label(f"opspace · {self._about['robot']['name']} · {directory.name}")
+        gui.main_panel.dock_right()
+        gui.main_panel.set_width(_WIDTH)
+        self._head = gui.add_html("")
+        self._run = RunControls(self._server, ask)
+        tabs = gui.add_tab_group()
+        with tabs.add_tab("Tasks"):
+            self._bars = gui.add_html("")
+            if ask is not None:
+                gui.add_divider()
+                self._controls = StackControls(self._server, ask, self._about["tasks"])
+        with tabs.add_tab("Joints"):
+            self._joints = gui.add_html("")
+        with tabs.add_tab("Charts"):
+            self._charts = self._add_charts()
+
+    def _add_charts(self) -> list[Chart]:
+        reader = self._reader
+        while not reader.recording.refresh():
+            time.sleep(1.0 / PICTURES)
+        charts = [Chart(self._server, reader, "torque [N·m]", torque_columns(reader))]
+        if weakest := sigma_columns(reader):
+            charts.append(Chart(self._server, reader, "weakest σ of a level", weakest))
+        return charts
+
+    def _drag(self, task: str, place: dict[str, tuple[float, ...]]) -> None:
+        if self._ask is not None:
+            request: dict[str, Any] = {"kind": "lead", "tasks": [task]}
+            request.update({what: list(values) for what, values in place.items()})
+            self._ask({"request": request})
+
+
+def _robot(about: dict[str, Any]) -> Robot:
+    found = load_robot(about["file"] or about["name"], floating_base=about["floating_base"])
+    if found.nv != len(about["joints"]):
+        raise InputError(
+            f"robot {found.name!r} has {found.nv} joints now, the recording {len(about['joints'])}"
+        )
+    return found

@@ -1,0 +1,231 @@
+"""The robot on the page, its targets, and the directions that it is about to lose."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import viser
+
+from opspace.robots.protocol import Robot
+from opspace.robots.visuals import visuals_of
+from opspace.tasks.rotation import exp_rotation, quaternion_from_matrix
+from opspace.view.frame import Frame, LevelFrame, TaskFrame
+from opspace.view.panels import blend_rgb
+
+Dragged = Callable[[str, dict[str, tuple[float, ...]]], None]
+"""Takes the name of a task and where its target was dragged to."""
+
+DRAG_PERIOD = 0.05
+"""Seconds between two requests while a target is being dragged."""
+
+_LENGTH = 0.16
+_ARC = np.linspace(0.0, 1.5 * math.pi, 25)
+_TRAIL_POINTS = 80
+_TARGET_COLOR, _TRAIL_COLOR = (221, 46, 36), (0, 68, 136)
+
+
+class Scene:
+    """Everything in three dimensions.
+
+    Args:
+        server: The server of the page.
+        robot: The robot, for its frames; its state is changed.
+        tasks: What the recording says about the tasks.
+        dragged: Told about targets that are dragged; None lets nothing be dragged.
+    """
+
+    def __init__(
+        self,
+        server: viser.ViserServer,
+        robot: Robot,
+        tasks: Mapping[str, Mapping[str, Any]],
+        dragged: Dragged | None,
+    ) -> None:
+        self._server, self._robot = server, robot
+        self._visuals = visuals_of(robot)
+        server.scene.set_up_direction("+z")
+        server.scene.add_grid("/floor", width=4.0, height=4.0, cell_size=0.2, section_size=1.0)
+        self._shapes = [
+            server.scene.add_mesh_simple(
+                f"/robot/{i}",
+                vertices=np.asarray(shape.vertices, dtype=np.float32),
+                faces=np.asarray(shape.faces, dtype=np.uint32),
+                color=shape.color,
+                flat_shading=shape.flat,
+            )
+            for i, shape in enumerate(self._visuals.shapes)
+        ]
+        self._tool = robot.frame_id(robot.tool)
+        nothing = np.zeros((0, 2, 3), dtype=np.float32)
+        self._trail = server.scene.add_line_segments(
+            "/trail", nothing, _TRAIL_COLOR, thickness=2.0, thickness_units="screen"
+        )
+        self._directions = server.scene.add_line_segments(
+            "/directions", nothing, np.zeros((0, 2, 3), np.uint8), thickness=0.006
+        )
+        self._targets = {
+            name: _Target(server, name, about, dragged)
+            for name, about in tasks.items()
+            if about["led_by"]
+        }
+        self._looking = False
+
+    def show(self, frame: Frame, trail: np.ndarray, live: bool) -> None:
+        """Draw a tick.
+
+        Args:
+            frame: The tick.
+            trail: (k, 3) where the tool was before [m].
+            live: Whether targets may be dragged now.
+        """
+        robot = self._robot
+        robot.update(frame.q, np.zeros(robot.nv))
+        positions, quaternions = self._visuals.poses(frame.q)
+        for handle, position, quaternion in zip(self._shapes, positions, quaternions, strict=True):
+            handle.position, handle.wxyz = position, quaternion
+        tool = robot.position(self._tool)
+        way = np.vstack([trail[-_TRAIL_POINTS:], tool]).astype(np.float32)
+        self._trail.points = np.stack([way[:-1], way[1:]], axis=1)
+        self._show_directions(frame.levels, tool)
+        for task in frame.tasks:
+            if task.name in self._targets:
+                self._targets[task.name].show(task, robot, live)
+        if not self._looking:
+            self._look(positions, tool)
+
+    def _look(self, positions: np.ndarray, tool: np.ndarray) -> None:
+        """Place the camera of every new page so that the robot is in view."""
+        points = np.vstack([positions, tool])
+        centre = 0.5 * (points.min(axis=0) + points.max(axis=0))
+        reach = max(float(np.ptp(points, axis=0).max()), 0.5)
+        camera = self._server.initial_camera
+        camera.look_at = centre
+        camera.position = centre + reach * np.array([1.1, -1.1, 0.6])
+        self._looking = True
+
+    def _show_directions(self, levels: Sequence[LevelFrame], tool: np.ndarray) -> None:
+        lines, colors = [], []
+        for level in levels:
+            known = level.activation[~np.isnan(level.activation)]
+            if np.isnan(level.weakest).any() or not known.size:
+                continue
+            drawn = _direction(level.weakest, tool)
+            lines += drawn
+            colors += [np.tile(blend_rgb(float(known[-1])), (2, 1))] * len(drawn)
+        self._directions.points = np.array(lines, dtype=np.float32).reshape(-1, 2, 3)
+        self._directions.colors = np.array(colors, dtype=np.uint8).reshape(-1, 2, 3)
+
+
+class _Target:
+    """Where a task is wanted, and the handle to drag it by."""
+
+    def __init__(
+        self,
+        server: viser.ViserServer,
+        name: str,
+        about: Mapping[str, Any],
+        dragged: Dragged | None,
+    ) -> None:
+        self._name, self._about = name, about
+        self._goal: dict[str, tuple[float, ...]] = {}
+        self._dragging = False
+        self._ball = server.scene.add_icosphere(
+            f"/target/{name}", radius=0.014, color=_TARGET_COLOR, visible=False
+        )
+        self._handle: viser.TransformControlsHandle | None = None
+        if dragged is not None:
+            self._handle = self._add_handle(server, dragged)
+
+    def show(self, task: TaskFrame, robot: Robot, live: bool) -> None:
+        """Put ball and handle where the task is wanted."""
+        position, rotation = self._actual(robot)
+        if "position" in self._about["led_by"] and len(task.error) in (3, 6):
+            position = position + np.nan_to_num(task.error[:3])
+        if "orientation" in self._about["led_by"] and len(task.error) in (3, 6):
+            rotation = exp_rotation(np.nan_to_num(task.error[-3:])) @ rotation
+        self._ball.visible = task.present and "position" in self._about["led_by"]
+        self._ball.position = position
+        if self._handle is None:
+            return
+        self._handle.visible = task.present and live
+        if not (self._dragging or self._goal):
+            self._handle.position = position
+            self._handle.wxyz = np.array(quaternion_from_matrix(rotation))
+        elif not self._dragging and "position" not in self._about["led_by"]:
+            self._handle.position = position
+
+    def _actual(self, robot: Robot) -> tuple[np.ndarray, np.ndarray]:
+        frame = self._about["frame"] or robot.tool
+        if self._about["center_of_mass"]:
+            return robot.com_position(), np.eye(3)
+        id_ = robot.frame_id(frame)
+        return robot.position(id_), robot.rotation(id_)
+
+    def _add_handle(
+        self, server: viser.ViserServer, dragged: Dragged
+    ) -> viser.TransformControlsHandle:
+        led_by = self._about["led_by"]
+        handle = server.scene.add_transform_controls(
+            f"/handle/{self._name}",
+            scale=0.16,
+            line_width=3.0,
+            disable_axes="position" not in led_by,
+            disable_sliders="position" not in led_by,
+            disable_rotations="orientation" not in led_by,
+            depth_test=False,
+            visible=False,
+        )
+        sent = 0.0
+
+        @handle.on_drag_start
+        def _(event: Any) -> None:
+            del event
+            self._dragging = True
+
+        @handle.on_update
+        def _(event: Any) -> None:
+            nonlocal sent
+            del event
+            if not self._dragging:
+                return
+            now = time.monotonic()
+            if now - sent >= DRAG_PERIOD:
+                sent = now
+                self._send(handle, dragged)
+
+        @handle.on_drag_end
+        def _(event: Any) -> None:
+            del event
+            self._dragging = False
+            self._send(handle, dragged)
+
+        return handle
+
+    def _send(self, handle: viser.TransformControlsHandle, dragged: Dragged) -> None:
+        place = {"position": handle.position, "orientation": handle.wxyz}
+        self._goal = {what: tuple(float(x) for x in place[what]) for what in self._about["led_by"]}
+        dragged(self._name, self._goal)
+
+
+def _direction(weakest: np.ndarray, tool: np.ndarray) -> list[np.ndarray]:
+    """Return a line along the linear part of a direction and an arc about its angular part."""
+    linear, angular = weakest[:3], weakest[3:]
+    whole = math.sqrt(float(weakest @ weakest)) or 1.0
+    lines = []
+    along = float(np.linalg.norm(linear)) / whole
+    if along > 0.1:
+        reach = _LENGTH * linear / whole
+        lines.append(np.array([tool - reach, tool + reach]))
+    about = float(np.linalg.norm(angular)) / whole
+    if about > 0.1:
+        axis = angular / np.linalg.norm(angular)
+        side = np.cross(axis, np.eye(3)[int(np.argmin(np.abs(axis)))])
+        side *= 0.6 * _LENGTH * about / np.linalg.norm(side)
+        other = np.cross(axis, side)
+        ring = tool + np.outer(np.cos(_ARC), side) + np.outer(np.sin(_ARC), other)
+        lines += list(np.stack([ring[:-1], ring[1:]], axis=1))
+    return lines

@@ -1,0 +1,167 @@
+"""The observer that shows a run in a browser while it goes on, and lets it be changed from there."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from types import TracebackType
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from opspace.controller import Command, ReferenceController
+from opspace.errors import OpspaceError
+from opspace.record.format import Ended
+from opspace.record.observer import State, TickRecorder
+from opspace.sim.pacing import Pacing
+from opspace.sim.requests import FILE, Changes, RequestDesk, RunRequest
+from opspace.tasks import Task
+from opspace.view.process import PageProcess
+
+if TYPE_CHECKING:
+    from typing_extensions import Self
+
+HOST = "127.0.0.1"
+PORT = 8080
+
+
+class Viewer:
+    """Record a run and show it on a web page while it goes on.
+
+    The page lives in a process of its own and reads the recording from the disk, so a run that is
+    watched does what it does without: the same ticks, the same numbers. What is asked for on the page
+    is applied between two ticks and written to ``requests.jsonl`` beside the recording.
+
+    Used as a context manager around `opspace.simulate`, or with `observe` after every tick of a loop
+    of one's own.
+
+    Args:
+        controller: The controller of the run.
+        directory: Where the recording is written.
+        header: What the recording says about itself.
+        tasks: Tasks that are not in the stack yet, for the page to insert.
+        levels: Tasks that may be at each level, see `opspace.TickRecorder`.
+        truth: See `opspace.TickRecorder`.
+        overwrite: Replace a recording that is already there.
+        speed: Seconds of the run per second of the clock; None holds nothing back, for a loop that
+            has a clock of its own. Then the page cannot pause either.
+        host: Address to listen at; the default lets nobody in from other machines.
+        port: Port to listen at; the next free one is taken where it is in use.
+        opened: Told about the page's address once it can be opened.
+        wait: Begin when a browser has opened the page.
+
+    Raises:
+        MissingExtraError: The viewer is not installed.
+        InputError: A task that does not fit the robot, or a speed not above 0.
+        RecordingError: There is a recording already, or the directory cannot be written.
+    """
+
+    def __init__(
+        self,
+        controller: ReferenceController,
+        directory: Path | str,
+        header: Mapping[str, object] | None = None,
+        *,
+        tasks: Sequence[Task] = (),
+        levels: Mapping[float, Sequence[Task]] | None = None,
+        truth: State | None = None,
+        overwrite: bool = False,
+        speed: float | None = 1.0,
+        host: str = HOST,
+        port: int = PORT,
+        opened: Callable[[str], None] = lambda address: print(f"open {address}"),
+        wait: bool = False,
+    ) -> None:
+        directory = Path(directory)
+        self._pacing = None if speed is None else Pacing(speed)
+        self._recorder = TickRecorder(
+            directory,
+            controller,
+            header or {},
+            tasks=tasks,
+            levels=levels,
+            truth=truth,
+            overwrite=overwrite,
+        )
+        self._desk = RequestDesk(Changes(controller, tasks), directory / FILE, self._answer)
+        self._opened, self._wait = opened, wait
+        self._page = PageProcess(directory, host, port, self._hear)
+        self._started = False
+
+    def observe(self, q: np.ndarray, v: np.ndarray, command: Command) -> None:
+        """Record a tick, do what was asked for, and wait until the next one is due."""
+        self._recorder.observe(q, v, command)
+        if not self._started:
+            self._begin()
+        self._desk.observe(q, v, command)
+        if self._pacing is not None:
+            self._pacing.observe(q, v, command)
+
+    def ask(self, request: RunRequest) -> None:
+        """Ask for something as the page does, from any thread."""
+        self._desk.ask(request)
+
+    def end(self, how: Ended = "completed", reason: str = "") -> None:
+        """Finish the recording; the page still shows it until `close`.
+
+        Args:
+            how: How the run ended, see `opspace.Recorder.close`.
+            reason: Why, in words.
+        """
+        self._recorder.close(how, reason)
+        self._desk.close()
+        self._page.say({"ended": True})
+
+    def close(self) -> None:
+        """Finish the recording and let the page go."""
+        self.end()
+        self._page.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        if isinstance(error, KeyboardInterrupt):
+            self.end("interrupted")
+        elif error is not None:
+            self.end("crashed", f"{type(error).__name__}: {error}")
+        self.close()
+
+    def _begin(self) -> None:
+        self._page.wait()
+        self._opened(self._page.address)
+        if self._wait:
+            self._page.wait_for_visitor()
+        self._started = True
+
+    def _answer(self, request: RunRequest, reason: str) -> None:
+        what = f"{request.kind} {' and '.join(request.tasks)}"
+        self._page.say({"answer": what, "reason": reason})
+
+    def _hear(self, message: Mapping[str, Any]) -> None:
+        """Do what the page says; in a thread of the page's."""
+        if "request" in message:
+            try:
+                self._desk.ask(RunRequest.read(message["request"]))
+            except OpspaceError as error:
+                self._page.say({"answer": "request", "reason": str(error)})
+        elif self._pacing is not None:
+            self._control(self._pacing, message)
+
+    @staticmethod
+    def _control(pacing: Pacing, message: Mapping[str, Any]) -> None:
+        match message["control"]:
+            case "pause":
+                pacing.pause()
+            case "resume":
+                pacing.resume()
+            case "step":
+                pacing.pause()
+                pacing.step()
+            case _:
+                pacing.speed = float(message["value"])
