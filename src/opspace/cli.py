@@ -431,8 +431,8 @@ def _view_recording(run: Path, host: str, port: int) -> None:
     from opspace.view.page import Page
 
     page = Page(run, host, port, None)
-    print(f"open {page.address}  (Ctrl-C ends it)", flush=True)
     try:
+        print(f"open {page.address}  (Ctrl-C ends it)", flush=True)
         page.serve()
     except KeyboardInterrupt:
         page.close()
@@ -445,8 +445,8 @@ def _stay(result: RunResult) -> None:
     print(f"results: {result.directory}")
     if result.outcome.reason == "interrupted":
         return
-    print("the page still shows the run; Ctrl-C closes it", flush=True)
     try:
+        print("the page still shows the run; Ctrl-C closes it", flush=True)
         while True:
             time.sleep(1.0)
     except KeyboardInterrupt:

@@ -9,6 +9,7 @@ import viser
 from viser import uplot
 
 from opspace.view.frame import FrameReader
+from opspace.view.panels import short
 
 SECONDS = 8.0
 """How much of the past the charts show."""
@@ -45,8 +46,10 @@ class Chart:
             series=tuple(series),
             title=title,
             scales={"x": uplot.Scale(time=False), "y": uplot.Scale(auto=True)},
-            legend=uplot.Legend(show=True),
+            legend=uplot.Legend(show=True, live=False),
             height=HEIGHT,
+            # Room for the topmost number beside the axis.
+            padding=(14, 18, 0, 0),
         )
 
     def show(self, row: int) -> None:
@@ -60,7 +63,7 @@ class Chart:
 
 def torque_columns(reader: FrameReader) -> dict[str, str]:
     """List the torques by the name of the joint."""
-    return {name: f"tau/{name}" for name in reader.joints}
+    return {short(name, reader.joints): f"tau/{name}" for name in reader.joints}
 
 
 def sigma_columns(reader: FrameReader) -> dict[str, str]:

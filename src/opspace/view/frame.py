@@ -147,7 +147,7 @@ class FrameReader:
         """
         data = self.recording.data
         first = self.row_at(float(data[row, self._t]) - seconds)
-        stride = max(1, (row - first) // points)
+        stride = max(1, -(-(row - first) // points))
         shown = np.arange(row, first - 1, -stride)[::-1]
         return np.array(data[shown])[:, [self._t, *self.recording.columns(names)]]
 

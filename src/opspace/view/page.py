@@ -117,7 +117,8 @@ class Page:
 
     def close(self) -> None:
         """Stop listening."""
-        self._server.stop()
+        with contextlib.redirect_stdout(io.StringIO()):
+            self._server.stop()
 
     def _draw(self, row: int, now: float) -> None:
         frame = self._reader.at(row)
@@ -135,7 +136,7 @@ class Page:
 
     def _note(self, live: bool) -> str:
         if self._ask is None:
-            return "recorded" if self._reader.recording.ended else "the run is gone"
+            return "recorded" if self._reader.recording.ended else "recorded, cut short"
         if self._run.paused:
             return "paused"
         return "live" if live else "live, looking back"

@@ -87,12 +87,12 @@ def joints(frame: Frame, names: Sequence[str], robot: Mapping[str, Any]) -> str:
         place = frame.q[i + free] if free == 0 or i >= 6 else math.nan
         gauge = _range(frame, name, i, float(place), lower, upper, robot)
         torque = _torque(float(frame.tau[i]), robot["torque_limit"][i])
-        label = f'<span style="{_NAME}" title="{escape(name)}">{escape(_short(name, names))}</span>'
+        label = f'<span style="{_NAME}" title="{escape(name)}">{escape(short(name, names))}</span>'
         rows.append(f'<div style="{_ROW}">{label}{gauge}{torque}</div>')
     return _panel(rows)
 
 
-def _short(name: str, names: Sequence[str]) -> str:
+def short(name: str, names: Sequence[str]) -> str:
     """Return a joint's name without what all joints' names begin with."""
     first, last = min(names), max(names)
     common = next((i for i, c in enumerate(first) if i >= len(last) or c != last[i]), len(first))
@@ -101,7 +101,8 @@ def _short(name: str, names: Sequence[str]) -> str:
 
 
 def _used(level: LevelFrame, present: Sequence[TaskFrame]) -> bool:
-    return any(abs(task.level - level.number) < 1.0 for task in present)
+    there = any(task.level == level.number for task in present)
+    return there or not bool(np.isnan(level.activation).all())
 
 
 def _level(level: LevelFrame) -> str:

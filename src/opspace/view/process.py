@@ -49,7 +49,8 @@ class PageProcess:
         self._ready, self._visited = Event(), Event()
         self._failure = ""
         self.address = ""
-        Thread(target=self._listen, daemon=True).start()
+        self._listening = Thread(target=self._listen, daemon=True)
+        self._listening.start()
 
     def wait(self) -> None:
         """Wait until the page can be opened.
@@ -85,20 +86,24 @@ class PageProcess:
         except subprocess.TimeoutExpired:
             self._process.kill()
             self._process.wait()
+        self._listening.join(5.0)
 
     def _listen(self) -> None:
         assert self._process.stdout is not None
-        for line in self._process.stdout:
-            message = json.loads(line)
-            if "address" in message:
-                self.address = message["address"]
-                self._ready.set()
-            elif "failed" in message:
-                self._failure = message["failed"]
-                self._ready.set()
-            elif "visited" in message:
-                self._visited.set()
-            else:
-                self._heard(message)
+        with self._process.stdout as messages:
+            for line in messages:
+                self._take(json.loads(line))
         self._ready.set()
         self._visited.set()
+
+    def _take(self, message: Mapping[str, Any]) -> None:
+        if "address" in message:
+            self.address = message["address"]
+            self._ready.set()
+        elif "failed" in message:
+            self._failure = message["failed"]
+            self._ready.set()
+        elif "visited" in message:
+            self._visited.set()
+        else:
+            self._heard(message)

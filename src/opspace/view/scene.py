@@ -60,12 +60,13 @@ class Scene:
             for i, shape in enumerate(self._visuals.shapes)
         ]
         self._tool = robot.frame_id(robot.tool)
-        nothing = np.zeros((0, 2, 3), dtype=np.float32)
+        # The page never draws lines that it has got without a single point.
+        nothing = np.zeros((1, 2, 3), dtype=np.float32)
         self._trail = server.scene.add_line_segments(
             "/trail", nothing, _TRAIL_COLOR, thickness=2.0, thickness_units="screen"
         )
         self._directions = server.scene.add_line_segments(
-            "/directions", nothing, np.zeros((0, 2, 3), np.uint8), thickness=0.006
+            "/directions", nothing, np.zeros((1, 2, 3), np.uint8), thickness=0.006
         )
         self._targets = {
             name: _Target(server, name, about, dragged)
@@ -115,7 +116,10 @@ class Scene:
                 continue
             drawn = _direction(level.weakest, tool)
             lines += drawn
-            colors += [np.tile(blend_rgb(float(known[-1])), (2, 1))] * len(drawn)
+            colors += [np.tile(_light(blend_rgb(float(known[-1]))), (2, 1))] * len(drawn)
+        self._directions.visible = bool(lines)
+        if not lines:
+            return
         self._directions.points = np.array(lines, dtype=np.float32).reshape(-1, 2, 3)
         self._directions.colors = np.array(colors, dtype=np.uint8).reshape(-1, 2, 3)
 
@@ -209,6 +213,11 @@ class _Target:
         place = {"position": handle.position, "orientation": handle.wxyz}
         self._goal = {what: tuple(float(x) for x in place[what]) for what in self._about["led_by"]}
         dragged(self._name, self._goal)
+
+
+def _light(color: tuple[int, int, int]) -> np.ndarray:
+    """Return a colour as an amount of light, which is what the page takes for colours by point."""
+    return 255.0 * (np.array(color) / 255.0) ** 2.2
 
 
 def _direction(weakest: np.ndarray, tool: np.ndarray) -> list[np.ndarray]:
