@@ -5,12 +5,13 @@ BIN := $(VENV)/bin
 INSTALLED := $(VENV)/.installed
 BENCH := .venv-bench
 
-.PHONY: help test lint test-slow reproduce comparison bench constraints clean
+.PHONY: help test lint test-slow test-browser reproduce comparison bench constraints clean
 
 help:
 	@echo "make reproduce   the two experiments of the paper: tables and figures in results/"
 	@echo "make test        lint, types, import rules and the default test suite"
 	@echo "make test-slow   campaigns that take minutes"
+	@echo "make test-browser the viewer in headless Chromium, which must be installed"
 	@echo "make comparison  run other methods on the show-piece; rewrites the tables in the documents"
 	@echo "make bench       time the tick beside other controllers, in an environment of its own"
 	@echo "make constraints pin the versions that the tests cover"
@@ -33,6 +34,9 @@ test: lint
 
 test-slow: $(INSTALLED)
 	$(BIN)/python -m pytest -m slow
+
+test-browser: $(INSTALLED)
+	$(BIN)/python -m pytest -m browser
 
 reproduce: $(INSTALLED)
 	$(BIN)/opspace reproduce all --out results
