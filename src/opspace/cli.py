@@ -407,23 +407,32 @@ def film(
     print(f"results: {path}")
 
 
-@app.command(epilog="Example: opspace plot results/singularity/transition tau tool/x")
+@app.command(epilog="Example: opspace plot results/a results/b tau tool/x --overlay")
 def plot(
-    recording: Annotated[Path, typer.Argument(help="Directory of a recording.", metavar="RUN")],
-    columns: Annotated[
-        list[str] | None,
-        typer.Argument(help="Columns or groups of columns. [default: q v tau tasks]"),
-    ] = None,
+    words: Annotated[
+        list[str],
+        typer.Argument(
+            help="Directories of recordings, then columns or groups of columns. A word after the "
+            "first is a column where the first recording has it; ./NAME always is a directory. "
+            "[default columns: q v tau tasks]",
+            metavar="RUN|COLUMN",
+        ),
+    ],
+    overlay: Annotated[
+        bool, typer.Option("--overlay", help="A panel per column with a line per recording.")
+    ] = False,
     out: Annotated[
-        Path | None, typer.Option(help="File to write (.png). [default: RUN/plot.png]")
+        Path | None, typer.Option(help="File to write (.png). [default: FIRST RUN/plot.png]")
     ] = None,
 ) -> None:
-    """Draw columns of a recording over time."""
-    from opspace.plots import plot_columns, save
-    from opspace.record import load
+    """Draw columns of recordings over time, side by side or over each other."""
+    from opspace.plots import overlay_columns, plot_columns, save
+    from opspace.record.selection import select
 
-    path = out or recording / "plot.png"
-    save(plot_columns({recording.name: load(recording)}, columns or ()), path)
+    recordings, columns = select(words)
+    draw = overlay_columns if overlay else plot_columns
+    path = out or next(iter(recordings.values())).directory / "plot.png"
+    save(draw(recordings, columns), path)
     print(f"results: {path}")
 
 

@@ -4,11 +4,13 @@ import json
 
 import pytest
 from tests.cli.test_cli import run
+from tests.plots import synthetic
 from tests.scenario.short import short
 
 from opspace.record import load
 from opspace.scenario import dump_scenario
 
+VARIANTS = ("without", "transition")
 KP = "tasks.position.kp"
 
 
@@ -139,6 +141,18 @@ def test_plot_draws_columns_of_a_run(capsys, tmp_path, scenario):
     assert printed == f"results: {out / 'plot.png'}\n"
     assert (out / "plot.png").stat().st_size > 10_000
     assert "did you mean 'tau'" in refused(capsys, "plot", str(out), "tauu")
+
+
+@pytest.mark.parametrize("overlay", [[], ["--overlay"]])
+def test_plot_draws_runs_together(capsys, tmp_path, overlay):
+    runs = [
+        str(synthetic.write_run(tmp_path / n, "singularity", n, 0.1).directory) for n in VARIANTS
+    ]
+    path = tmp_path / "new" / "both.png"
+    words = [runs[0], "tau", *runs[1:], "tool/x", *overlay, "--out", str(path)]
+    assert run(capsys, "plot", *words) == (0, f"results: {path}\n", "")
+    assert path.stat().st_size > 10_000
+    assert "given twice" in refused(capsys, "plot", runs[0], runs[0])
 
 
 def test_check_is_the_same_in_tables_and_json(capsys):

@@ -59,7 +59,7 @@ def test_a_column_that_only_another_recording_has_is_left_to_who_draws():
         (["tasks"], RecordingError, "tasks: there is no such directory"),
         (["a", "other"], RecordingError, "other is not a recording.*below it: other/a"),
         (["a", "a/"], InputError, "a is given twice"),
-        (["a", "tua"], UnknownNameError, r"recording, or column of a, 'tua'.*did you mean 'tau'"),
+        (["a", "tua"], UnknownNameError, r"recording, or column of a 'tua'.*did you mean 'tau'"),
         (["a", "othr/a"], UnknownNameError, "othr/a"),
     ],
 )

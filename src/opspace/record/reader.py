@@ -10,7 +10,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from opspace.errors import InputError, RecordingError, missing_extra, unknown_name
+from opspace.errors import (
+    InputError,
+    RecordingError,
+    UnknownNameError,
+    missing_extra,
+    unknown_name,
+)
 from opspace.record import format as fmt
 
 if TYPE_CHECKING:
@@ -119,6 +125,21 @@ class Recording:
             UnknownNameError: No column lies in such a group.
         """
         return self.data[:, [self._index[name] for name in self.members(prefix)]]
+
+    def no_column(self, name: str, kind: str = "column") -> UnknownNameError:
+        """Build the error for what is neither a column nor a group, listing groups before columns.
+
+        Args:
+            name: The name as given.
+            kind: What it should have been.
+
+        Returns:
+            The error, to be raised by the caller.
+        """
+        alone = [column for column in self.names if "/" not in column]
+        listed = [*(group for group in self.groups if group.count("/") <= 1), *alone]
+        choices = [*self.groups, *self.names]
+        return unknown_name(f"{kind} of {self.directory}", name, choices, listed)
 
     def to_pandas(self) -> pd.DataFrame:
         """Copy the recording into a table of pandas.

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from opspace.errors import InputError, unknown_name
+from opspace.errors import InputError
 from opspace.record.reader import Recording, find_recording, load
 
 
@@ -52,8 +52,7 @@ def select(words: Sequence[str]) -> Selection:
     recordings = [first, *(load(path) for path in paths[1:])]
     for column in columns:
         if not any(_has(recording, column) for recording in recordings):
-            what = f"recording, or column of {first.directory},"
-            raise unknown_name(what, column, [*first.groups, *first.names])
+            raise first.no_column(column, "recording, or column")
     return Selection(dict(zip(titles(paths), recordings, strict=True)), columns)
 
 
