@@ -407,6 +407,41 @@ def film(
     print(f"results: {path}")
 
 
+@app.command(epilog="Example: opspace export results/showpiece --to mcap")
+def export(
+    recording: Annotated[Path, typer.Argument(help="Directory of a recording.", metavar="RUN")],
+    to: Annotated[
+        str | None,
+        typer.Option(
+            metavar="FORMAT",
+            help="mcap (Foxglove, PlotJuggler), rerun or csv. [default: what --out ends in]",
+        ),
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(help="File to write. [default: RUN/run.mcap, RUN/run.rrd or RUN/run.csv]"),
+    ] = None,
+    overwrite: Annotated[
+        bool, typer.Option("--overwrite", help="Replace a file that is already there.")
+    ] = False,
+) -> None:
+    """Write a recording as a file that another program opens."""
+    from opspace.errors import InputError, unknown_name
+    from opspace.export import FORMATS, export
+    from opspace.record import load
+    from opspace.scenario.progress import counter
+
+    if to is None and out is None:
+        raise InputError(f"what shall it be? --to takes {', '.join(FORMATS)}")
+    if to is not None and to not in FORMATS:
+        raise unknown_name("format", to, FORMATS)
+    loaded = load(recording)
+    path = out or loaded.directory / f"run{FORMATS[str(to)]}"
+    with counter(path.name) as progress:
+        export(loaded, path, to, overwrite=overwrite, progress=progress)
+    print(f"results: {path}")
+
+
 @app.command(epilog="Example: opspace plot results/a results/b tau tool/x --overlay")
 def plot(
     words: Annotated[
