@@ -383,27 +383,32 @@ def replay(
         _print_table(("status", "held for [s]", "first at [s]"), rows)
 
 
-@app.command(epilog="Example: opspace film results/showpiece --speed 2 --out showpiece.gif")
+@app.command(epilog="Example: opspace film results/showpiece --speed 2 --out showpiece.mp4")
 def film(
     recording: Annotated[
         Path, typer.Argument(help="Directory of a recording of opspace run.", metavar="RUN")
     ],
     speed: Annotated[float, typer.Option(help="Seconds of the run per second of film.")] = 1.0,
-    fps: Annotated[float, typer.Option(help="Pictures per second.")] = 10.0,
+    fps: Annotated[
+        float | None, typer.Option(help="Pictures per second. [default: 10 (.gif), 30 (.mp4)]")
+    ] = None,
     out: Annotated[
-        Path | None, typer.Option(help="File to write (.gif). [default: RUN/film.gif]")
+        Path | None, typer.Option(help="File to write (.gif or .mp4). [default: RUN/film.gif]")
     ] = None,
 ) -> None:
-    """Draw a run as an animated GIF."""
+    """Draw a run as an animated GIF or as an MP4."""
     from opspace.record import load
     from opspace.scenario import load_scenario
     from opspace.scenario.build import build_robot
+    from opspace.scenario.progress import counter
     from opspace.scenario.run import SCENARIO
     from opspace.sim.film import film
 
-    path = out or recording / "film.gif"
-    robot = build_robot(load_scenario(recording / SCENARIO))
-    film(load(recording), robot, path, fps=fps, speed=speed)
+    loaded = load(recording)
+    path = out or loaded.directory / "film.gif"
+    robot = build_robot(load_scenario(loaded.directory / SCENARIO))
+    with counter(path.name) as progress:
+        film(loaded, robot, path, fps=fps, speed=speed, progress=progress)
     print(f"results: {path}")
 
 
