@@ -33,11 +33,11 @@ class Field(NamedTuple):
 
     Attributes:
         keys: Where it lies in a message, from the outside to the inside.
-        index: Which column of the recording it is.
+        number: Which column of the recording it is.
     """
 
     keys: tuple[str, ...]
-    index: int
+    number: int
 
 
 def write(recording: Recording, path: Path) -> Iterator[tuple[int, int]]:
@@ -87,11 +87,11 @@ def topics_of(columns: Sequence[Column]) -> dict[str, list[Field]]:
         By topic, such as ``/tau`` or ``/tasks/position``, its fields.
     """
     topics: dict[str, list[Field]] = {}
-    for index, column in enumerate(columns):
+    for number, column in enumerate(columns):
         parts = (ALONE, column.name) if "/" not in column.name else tuple(column.name.split("/"))
         depth = 2 if parts[0] in OF_GROUPS and len(parts) > 2 else 1
         fields = topics.setdefault("/" + "/".join(parts[:depth]), [])
-        fields.append(Field(parts[depth:], index))
+        fields.append(Field(parts[depth:], number))
     return topics
 
 
@@ -105,8 +105,8 @@ def _channel(writer: Writer, topic: str, fields: Sequence[Field], columns: Seque
 def _schema(name: str, fields: Sequence[Field], columns: Sequence[Column]) -> dict[str, Any]:
     """Describe the messages of a topic; every field says its unit."""
     schema = {"title": name, "type": "object", "properties": {}}
-    for keys, index in fields:
-        column, place = columns[index], schema
+    for keys, number in fields:
+        column, place = columns[number], schema
         for key in keys[:-1]:
             place = place["properties"].setdefault(key, {"type": "object", "properties": {}})
             if place["type"] != "object":
@@ -125,10 +125,10 @@ def _clash(column: Column) -> InputError:
     return InputError(f"column {column.name!r} cannot be told from a group in JSON")
 
 
-def _message(fields: Sequence[Field], numbers: Sequence[float]) -> dict[str, Any]:
+def _message(fields: Sequence[Field], row: Sequence[float]) -> dict[str, Any]:
     message: dict[str, Any] = {}
-    for keys, index in fields:
-        value = numbers[index]
+    for keys, number in fields:
+        value = row[number]
         if math.isfinite(value):
             place = message
             for key in keys[:-1]:

@@ -1,5 +1,8 @@
 """A recording as a file of Rerun: a scalar per column, and the way of the tool in space."""
 
+# The present version of Rerun needs Python 3.11, so that a check for 3.10 sees none of its names.
+# pyright: reportAttributeAccessIssue=false
+
 from __future__ import annotations
 
 from collections.abc import Iterator

@@ -65,9 +65,9 @@ def write_mp4(frames: Iterator[Image.Image], path: Path, fps: float) -> None:
         film = imageio_ffmpeg.write_frames(
             str(path),
             size,
-            fps=fps,
+            fps=fps,  # pyright: ignore[reportArgumentType] - it takes any number
             codec="libx264",
-            quality=None,
+            quality=None,  # pyright: ignore[reportArgumentType] - as its own comments say
             macro_block_size=2,
             ffmpeg_log_level="error",
             output_params=["-crf", _QUALITY, "-movflags", "+faststart"],
