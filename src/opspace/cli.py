@@ -473,47 +473,96 @@ def replay(
         _print_table(("status", "held for [s]", "first at [s]"), rows)
 
 
-@app.command(epilog="Example: opspace film results/showpiece --speed 2 --out showpiece.gif")
+@app.command(epilog="Example: opspace film results/showpiece --speed 2 --out showpiece.mp4")
 def film(
     recording: Annotated[
         Path, typer.Argument(help="Directory of a recording of opspace run.", metavar="RUN")
     ],
     speed: Annotated[float, typer.Option(help="Seconds of the run per second of film.")] = 1.0,
-    fps: Annotated[float, typer.Option(help="Pictures per second.")] = 10.0,
+    fps: Annotated[
+        float | None, typer.Option(help="Pictures per second. [default: 10 (.gif), 30 (.mp4)]")
+    ] = None,
     out: Annotated[
-        Path | None, typer.Option(help="File to write (.gif). [default: RUN/film.gif]")
+        Path | None, typer.Option(help="File to write (.gif or .mp4). [default: RUN/film.gif]")
     ] = None,
 ) -> None:
-    """Draw a run as an animated GIF."""
+    """Draw a run as an animated GIF or as an MP4."""
     from opspace.record import load
     from opspace.scenario import load_scenario
     from opspace.scenario.build import build_robot
+    from opspace.scenario.progress import counter
     from opspace.scenario.run import SCENARIO
     from opspace.sim.film import film
 
-    path = out or recording / "film.gif"
-    robot = build_robot(load_scenario(recording / SCENARIO))
-    film(load(recording), robot, path, fps=fps, speed=speed)
+    loaded = load(recording)
+    path = out or loaded.directory / "film.gif"
+    robot = build_robot(load_scenario(loaded.directory / SCENARIO))
+    with counter(path.name) as progress:
+        film(loaded, robot, path, fps=fps, speed=speed, progress=progress)
     print(f"results: {path}")
 
 
-@app.command(epilog="Example: opspace plot results/singularity/transition tau tool/x")
-def plot(
+@app.command(epilog="Example: opspace export results/showpiece --to mcap")
+def export(
     recording: Annotated[Path, typer.Argument(help="Directory of a recording.", metavar="RUN")],
-    columns: Annotated[
-        list[str] | None,
-        typer.Argument(help="Columns or groups of columns. [default: q v tau tasks]"),
+    to: Annotated[
+        str | None,
+        typer.Option(
+            metavar="FORMAT",
+            help="mcap (Foxglove, PlotJuggler), rerun or csv. [default: what --out ends in]",
+        ),
     ] = None,
     out: Annotated[
-        Path | None, typer.Option(help="File to write (.png). [default: RUN/plot.png]")
+        Path | None,
+        typer.Option(help="File to write. [default: RUN/run.mcap, RUN/run.rrd or RUN/run.csv]"),
+    ] = None,
+    overwrite: Annotated[
+        bool, typer.Option("--overwrite", help="Replace a file that is already there.")
+    ] = False,
+) -> None:
+    """Write a recording as a file that another program opens."""
+    from opspace.errors import InputError, unknown_name
+    from opspace.export import FORMATS, export
+    from opspace.record import load
+    from opspace.scenario.progress import counter
+
+    if to is None and out is None:
+        raise InputError(f"what shall it be? --to takes {', '.join(FORMATS)}")
+    if to is not None and to not in FORMATS:
+        raise unknown_name("format", to, FORMATS)
+    loaded = load(recording)
+    path = out or loaded.directory / f"run{FORMATS[str(to)]}"
+    with counter(path.name) as progress:
+        export(loaded, path, to, overwrite=overwrite, progress=progress)
+    print(f"results: {path}")
+
+
+@app.command(epilog="Example: opspace plot results/a results/b tau tool/x --overlay")
+def plot(
+    words: Annotated[
+        list[str],
+        typer.Argument(
+            help="Directories of recordings, then columns or groups of columns. A word after the "
+            "first is a column where the first recording has it; ./NAME always is a directory. "
+            "[default columns: q v tau tasks]",
+            metavar="RUN|COLUMN",
+        ),
+    ],
+    overlay: Annotated[
+        bool, typer.Option("--overlay", help="A panel per column with a line per recording.")
+    ] = False,
+    out: Annotated[
+        Path | None, typer.Option(help="File to write (.png). [default: FIRST RUN/plot.png]")
     ] = None,
 ) -> None:
-    """Draw columns of a recording over time."""
-    from opspace.plots import plot_columns, save
-    from opspace.record import load
+    """Draw columns of recordings over time, side by side or over each other."""
+    from opspace.plots import overlay_columns, plot_columns, save
+    from opspace.record.selection import select
 
-    path = out or recording / "plot.png"
-    save(plot_columns({recording.name: load(recording)}, columns or ()), path)
+    recordings, columns = select(words)
+    draw = overlay_columns if overlay else plot_columns
+    path = out or next(iter(recordings.values())).directory / "plot.png"
+    save(draw(recordings, columns), path)
     print(f"results: {path}")
 
 

@@ -57,13 +57,16 @@ class ScenarioError(OpspaceError):
         self.key = key
 
 
-def unknown_name(kind: str, name: str, choices: Iterable[str]) -> UnknownNameError:
+def unknown_name(
+    kind: str, name: str, choices: Iterable[str], listed: Iterable[str] | None = None
+) -> UnknownNameError:
     """Build the error for a name that is not among ``choices``.
 
     Args:
         kind: What the name should have been, for example ``"frame"``.
         name: The name as given.
         choices: Every valid name.
+        listed: The names that the message lists where all would be too many; None lists all.
 
     Returns:
         The error, to be raised by the caller.
@@ -71,8 +74,9 @@ def unknown_name(kind: str, name: str, choices: Iterable[str]) -> UnknownNameErr
     valid = list(choices)
     near = difflib.get_close_matches(name, valid, n=3, cutoff=0.5)
     hint = f"; did you mean {' or '.join(repr(n) for n in near)}?" if near else ""
+    shown = valid if listed is None else list(listed)
     return UnknownNameError(
-        f"unknown {kind} {name!r}{hint} (valid: {', '.join(valid) if valid else 'none'})"
+        f"unknown {kind} {name!r}{hint} (valid: {', '.join(shown) if shown else 'none'})"
     )
 
 

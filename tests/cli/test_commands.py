@@ -4,11 +4,14 @@ import json
 
 import pytest
 from tests.cli.test_cli import run
+from tests.plots import synthetic
 from tests.scenario.short import short
 
+from opspace.export import FORMATS
 from opspace.record import load
 from opspace.scenario import dump_scenario
 
+VARIANTS = ("without", "transition")
 KP = "tasks.position.kp"
 
 
@@ -139,6 +142,69 @@ def test_plot_draws_columns_of_a_run(capsys, tmp_path, scenario):
     assert printed == f"results: {out / 'plot.png'}\n"
     assert (out / "plot.png").stat().st_size > 10_000
     assert "did you mean 'tau'" in refused(capsys, "plot", str(out), "tauu")
+
+
+@pytest.mark.parametrize("overlay", [[], ["--overlay"]])
+def test_plot_draws_runs_together(capsys, tmp_path, overlay):
+    runs = [
+        str(synthetic.write_run(tmp_path / n, "singularity", n, 0.1).directory) for n in VARIANTS
+    ]
+    path = tmp_path / "new" / "both.png"
+    words = [runs[0], "tau", *runs[1:], "tool/x", *overlay, "--out", str(path)]
+    assert run(capsys, "plot", *words) == (0, f"results: {path}\n", "")
+    assert path.stat().st_size > 10_000
+    assert "given twice" in refused(capsys, "plot", runs[0], runs[0])
+
+
+@pytest.mark.parametrize("to", FORMATS)
+def test_export_writes_beside_the_recording_once(capsys, tmp_path, to):
+    directory = synthetic.write_run(tmp_path / "a", "singularity", "switch", 0.1).directory
+    path = directory / f"run{FORMATS[to]}"
+    words = ["export", f"{directory}/", "--to", to]
+    assert run(capsys, *words) == (0, f"results: {path}\n", "")
+    written = path.stat().st_size
+    assert written > 10_000
+    assert f"{path} already exists" in refused(capsys, *words)
+    assert run(capsys, *words, "--overwrite")[0] == 0
+    other = tmp_path / "new" / path.name
+    assert run(capsys, "export", str(directory), "--out", str(other))[0] == 0
+    assert other.stat().st_size == pytest.approx(written, rel=0.01)
+
+
+@pytest.mark.parametrize(
+    ("words", "named"),
+    [
+        ([], "--to takes mcap, rerun, csv"),
+        (["--to", "mcp"], "did you mean 'mcap'"),
+        (["--out", "run.bag"], "valid: .mcap, .rrd, .csv"),
+        (["--to", "csv", "--out", "file/run.csv"], "file/run.csv cannot be written"),
+    ],
+)
+def test_a_wrong_export_is_named(capsys, tmp_path, monkeypatch, words, named):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "file").write_text("")
+    directory = synthetic.write_run(tmp_path / "a", "singularity", "switch", 0.5).directory
+    assert named in refused(capsys, "export", str(directory), *words)
+    assert "there is no such directory" in refused(capsys, "export", "absent", "--to", "csv")
+
+
+def test_film_writes_what_the_ending_says(capsys, tmp_path, scenario, monkeypatch):
+    out = tmp_path / "out"
+    run(capsys, "run", str(scenario), "--out", str(out))
+    drawn = []
+
+    def draw(recording, robot, path, **options):
+        drawn.append((len(recording), robot.name, path, options["fps"], options["speed"]))
+
+    monkeypatch.setattr("opspace.sim.film.film", draw)
+    assert run(capsys, "film", str(out)) == (0, f"results: {out / 'film.gif'}\n", "")
+    words = ["film", str(out), "--out", str(tmp_path / "x.mp4"), "--speed", "2", "--fps", "5"]
+    assert run(capsys, *words)[0] == 0
+    ticks = len(load(out))
+    assert drawn == [
+        (ticks, "puma560", out / "film.gif", None, 1.0),
+        (ticks, "puma560", tmp_path / "x.mp4", 5.0, 2.0),
+    ]
 
 
 def test_check_is_the_same_in_tables_and_json(capsys):

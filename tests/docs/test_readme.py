@@ -72,7 +72,9 @@ def test_a_failing_block_is_noticed(tmp_path):
 
 
 def test_the_programs_are_found():
-    assert {"README.md", "singularities.md"} <= {page.name for page in WITH_PROGRAMS}
+    assert {"README.md", "singularities.md", "recordings.md"} <= {
+        page.name for page in WITH_PROGRAMS
+    }
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda path: path.name)

@@ -11,6 +11,7 @@ from matplotlib.image import imread
 from opspace.errors import InputError, UnknownNameError
 from opspace.plots import (
     joint_limit_figures,
+    overlay_columns,
     overview_figure,
     plot_columns,
     singularity_figures,
@@ -19,6 +20,7 @@ from opspace.plots.joint_limit import limit_figure
 from opspace.plots.overview import draw_overview
 from opspace.plots.singularity import activation_figure, joint_speed_figure, position_figure
 from opspace.plots.torque import torque_figure
+from opspace.record import Column, Recorder, load
 from tests.plots import inspection, synthetic
 
 PICTURE = np.full((42, 48, 3), 128, dtype=np.uint8)
@@ -34,6 +36,8 @@ FIGURES = {
     "overview-one": lambda s, j: draw_overview({"singularity": s}),
     "columns": lambda s, j: plot_columns(s),
     "columns-one": lambda s, j: plot_columns({"run": j["switch"]}, ["tau", "tool/x", "levels"]),
+    "overlay": lambda s, j: overlay_columns(s),
+    "overlay-one": lambda s, j: overlay_columns(j, ["tool/x"]),
 }
 
 
@@ -149,5 +153,55 @@ def test_a_joint_keeps_its_colour(singularity, joint_limit):
 def test_columns_that_do_not_exist_are_refused(singularity):
     with pytest.raises(UnknownNameError, match=r"'tua'.*did you mean.*'tau'"):
         plot_columns(singularity, ["tua"])
-    with pytest.raises(InputError, match="no recording"):
-        plot_columns({})
+    for draw in (plot_columns, overlay_columns):
+        with pytest.raises(InputError, match="no recording"):
+            draw({})
+
+
+@pytest.fixture
+def unlike(singularity, tmp_path):
+    """A run, and one that lacks most columns and has another."""
+    columns = [Column("t", "s"), Column("tool/x", "m"), Column("tool/w", "m")]
+    with Recorder(tmp_path / "other", columns, {}) as recorder:
+        for t in (0.0, 9.0):
+            recorder.append([t, 0.5 + t, 1.0])
+    return {"run": singularity["switch"], "other": load(tmp_path / "other")}
+
+
+@pytest.mark.parametrize("draw", [plot_columns, overlay_columns])
+def test_the_run_that_lacks_a_column_is_named(unlike, draw):
+    with pytest.raises(UnknownNameError, match=r"column of \S*other 'tau'"):
+        draw(unlike, ["tau"])
+    with pytest.raises(InputError, match="none of q, v, tau, tasks"):
+        draw(unlike)
+
+
+def test_runs_of_other_columns_are_drawn_with_what_they_have(unlike):
+    figure = plot_columns(unlike, ["tool"])
+    run, other = figure.axes
+    assert [len(axes.lines) for axes in (run, other)] == [3, 2]
+    assert run.lines[0].get_color() == other.lines[0].get_color()
+    assert {text.get_text() for text in run.texts} == {"y", "z"}
+    assert {text.get_text() for text in other.texts} == {"x", "w"}
+    assert inspection.overlaps(figure) == []
+
+
+def test_overlaid_runs_have_a_line_each_with_their_name(unlike):
+    figure = overlay_columns(unlike, ["tool"])
+    assert [axes.get_title(loc="left") for axes in figure.axes] == [f"tool/{a}" for a in "xyzw"]
+    x = figure.axes[0]
+    shown = [line for line in x.lines if line.get_marker() == "None"]
+    for line, recording in zip(shown, unlike.values(), strict=True):
+        assert np.array_equal(
+            line.get_xydata(), recording.data[:, [0, recording.names.index("tool/x")]]
+        )
+    assert {text.get_text() for text in x.texts} == {"run", "other"}
+    ends = [line for line in x.lines if line.get_marker() == "x"]
+    assert [line.get_xdata()[-1] for line in ends] == [unlike["run"].t[-1]]  # it ends before
+
+
+@pytest.mark.parametrize("draw", [plot_columns, overlay_columns])
+def test_a_run_without_a_tick_is_named(draw, tmp_path):
+    empty = synthetic.write(tmp_path / "empty", {"t": np.zeros(0)})
+    with pytest.raises(InputError, match=r"empty holds no tick"):
+        draw({"empty": empty})

@@ -15,7 +15,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from opspace.errors import InputError, RecordingError, UnknownNameError
+from opspace.errors import InputError, MissingExtraError, RecordingError, UnknownNameError
 from opspace.record import Column, Recorder, load
 
 COLUMNS = (
@@ -279,7 +279,6 @@ def damage_json(path, **changes):
 
 
 DAMAGE = {
-    "no header": ("header.json", Path.unlink),
     "header cut": ("header.json", lambda p: p.write_text(p.read_text()[:-20])),
     "header binary": ("header.json", lambda p: p.write_bytes(b"\xff\x00")),
     "header a list": ("header.json", lambda p: p.write_text("[]")),
@@ -303,6 +302,48 @@ def test_damage_is_reported_with_the_file(tmp_path, kind):
         load(tmp_path)
 
 
-def test_a_directory_that_is_no_recording_is_named(tmp_path):
-    with pytest.raises(RecordingError, match=r"header\.json cannot be read"):
+# -- where a recording is looked for --------------------------------------------------------------
+
+
+@pytest.mark.parametrize("ending", ["", "/", "/.", "/data.f64", "/header.json", "/end.json"])
+@pytest.mark.parametrize("kind", [str, Path])
+def test_a_recording_is_found_however_it_is_named(tmp_path, ending, kind):
+    write(tmp_path / "run", rows_of(2))
+    found = load(kind(f"{tmp_path}/run{ending}"))
+    assert np.array_equal(found.data, rows_of(2))
+    assert found.directory == tmp_path / "run"
+
+
+def test_what_is_no_recording_is_named_and_near_ones_are_told(tmp_path):
+    write(tmp_path / "results" / "a", rows_of(1))
+    (tmp_path / "results" / "notes.txt").write_text("")
+    with pytest.raises(RecordingError, match=r"absent: there is no such directory"):
         load(tmp_path / "absent")
+    with pytest.raises(RecordingError, match=r"notes\.txt is not a recording"):
+        load(tmp_path / "results" / "notes.txt")
+    with pytest.raises(RecordingError, match=rf"recordings below it: {tmp_path}/results/a$"):
+        load(tmp_path / "results")
+
+
+# -- pandas ---------------------------------------------------------------------------------------
+
+
+def test_pandas_gets_every_number_with_time_and_units(tmp_path):
+    rows = rows_of(4)
+    rows[1, 2], rows[2, 3] = np.nan, np.inf
+    write(tmp_path, rows)
+    frame = load(tmp_path).to_pandas()
+    assert frame.index.name == "t [s]"
+    assert np.array_equal(frame.index.to_numpy(), rows[:, 0])
+    assert list(frame.columns) == [column.name for column in COLUMNS[1:]]
+    assert frame.to_numpy().tobytes() == rows[:, 1:].tobytes()
+    assert frame.attrs["units"] == {column.name: column.unit for column in COLUMNS[1:]}
+    frame["q/joint1"] *= 2.0  # it is a copy
+    assert np.array_equal(load(tmp_path).data[:, 1], rows[:, 1])
+
+
+def test_pandas_is_named_with_its_extra_where_it_is_missing(tmp_path, monkeypatch):
+    write(tmp_path, rows_of(1))
+    monkeypatch.setitem(sys.modules, "pandas", None)
+    with pytest.raises(MissingExtraError, match=r"pandas .* 'opspace\[export\]'"):
+        load(tmp_path).to_pandas()

@@ -26,6 +26,7 @@ HEADER = "header.json"
 DATA = "data.f64"
 END = "end.json"
 META = "meta.json"
+FILES = (HEADER, END, META, DATA)
 
 FORMAT = "opspace-recording"
 FORMAT_VERSION = 1

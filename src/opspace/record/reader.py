@@ -6,12 +6,21 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from opspace.errors import InputError, RecordingError, unknown_name
+from opspace.errors import (
+    InputError,
+    RecordingError,
+    UnknownNameError,
+    missing_extra,
+    unknown_name,
+)
 from opspace.record import format as fmt
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -43,6 +52,15 @@ class Recording:
     def names(self) -> tuple[str, ...]:
         """The column names in their order on disk."""
         return tuple(self._index)
+
+    @property
+    def groups(self) -> tuple[str, ...]:
+        """The names of groups of columns: ``tasks/position/error/0`` lies in three."""
+        groups: dict[str, None] = {}
+        for name in self._index:
+            parts = name.split("/")
+            groups.update(("/".join(parts[:i]), None) for i in range(1, len(parts)))
+        return tuple(groups)
 
     @property
     def units(self) -> Mapping[str, str]:
@@ -91,7 +109,7 @@ class Recording:
         """
         found = tuple(name for name in self._index if name.startswith(prefix + "/"))
         if not found:
-            raise unknown_name(f"column group of {self.directory}", prefix, self._groups())
+            raise unknown_name(f"column group of {self.directory}", prefix, self.groups)
         return found
 
     def group(self, prefix: str) -> np.ndarray:
@@ -108,12 +126,42 @@ class Recording:
         """
         return self.data[:, [self._index[name] for name in self.members(prefix)]]
 
-    def _groups(self) -> list[str]:
-        groups: dict[str, None] = {}
-        for name in self._index:
-            parts = name.split("/")
-            groups.update(("/".join(parts[:i]), None) for i in range(1, len(parts)))
-        return list(groups)
+    def no_column(self, name: str, kind: str = "column") -> UnknownNameError:
+        """Build the error for what is neither a column nor a group, listing groups before columns.
+
+        Args:
+            name: The name as given.
+            kind: What it should have been.
+
+        Returns:
+            The error, to be raised by the caller.
+        """
+        alone = [column for column in self.names if "/" not in column]
+        listed = [*(group for group in self.groups if group.count("/") <= 1), *alone]
+        choices = [*self.groups, *self.names]
+        return unknown_name(f"{kind} of {self.directory}", name, choices, listed)
+
+    def to_pandas(self) -> pd.DataFrame:
+        """Copy the recording into a table of pandas.
+
+        Returns:
+            A row per tick and a column per recorded quantity, by its name, without ``t``: the time
+            is the index ``t [s]``. ``frame.attrs["units"]`` is the unit by column.
+
+        Raises:
+            MissingExtraError: pandas is not installed.
+            UnknownNameError: The recording has no column ``t``.
+        """
+        try:
+            import pandas as pd  # noqa: PLC0415 - optional, and slow to import
+        except ImportError:
+            raise missing_extra("pandas", "export") from None
+        index = pd.Index(self.t.copy(), name=f"t [{self.units['t']}]")
+        names = [name for name in self.names if name != "t"]
+        values = self.data[:, [self._index[name] for name in names]]
+        frame = pd.DataFrame(values, index=index, columns=pd.Index(names, dtype=object))
+        frame.attrs["units"] = {name: self.units[name] for name in names}
+        return frame
 
 
 def load(directory: Path | str) -> Recording:
@@ -122,15 +170,15 @@ def load(directory: Path | str) -> Recording:
     A recording without ``end.json`` was cut short: the row that was being written is dropped.
 
     Args:
-        directory: The recording's directory.
+        directory: The recording's directory, or one of the recording's files in it.
 
     Returns:
         The recording.
 
     Raises:
-        RecordingError: A file is missing, corrupt or of another format.
+        RecordingError: There is no recording, or a file is missing, corrupt or of another format.
     """
-    directory = Path(directory)
+    directory = find_recording(directory)
     header = fmt.read_json(directory / fmt.HEADER)
     columns = _columns(directory / fmt.HEADER, header)
     data = _read_data(directory / fmt.DATA, len(columns))
@@ -144,6 +192,31 @@ def load(directory: Path | str) -> Recording:
         ended=ended,
         data=data,
     )
+
+
+def find_recording(path: Path | str) -> Path:
+    """Find the directory of the recording that a path means.
+
+    Args:
+        path: The directory, or a file of the recording in it.
+
+    Returns:
+        The directory.
+
+    Raises:
+        RecordingError: There is no recording; the message names those just below, if any.
+    """
+    path = Path(path)
+    if path.is_file() and path.name in fmt.FILES:
+        path = path.parent
+    if (path / fmt.HEADER).exists():
+        return path
+    if not path.exists():
+        raise RecordingError(f"{path}: there is no such directory")
+    what = f"is not a recording: it is no directory with a {fmt.HEADER} in it"
+    below = sorted(str(header.parent) for header in path.glob(f"*/{fmt.HEADER}"))
+    hint = f"; recordings below it: {', '.join(below)}" if below else ""
+    raise RecordingError(f"{path} {what}{hint}")
 
 
 def _columns(path: Path, header: Mapping[str, Any]) -> tuple[fmt.Column, ...]:

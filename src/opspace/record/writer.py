@@ -74,7 +74,7 @@ class Recorder:
         try:
             self.directory.mkdir(parents=True, exist_ok=True)
             if overwrite:
-                for name in (fmt.HEADER, fmt.END, fmt.META, fmt.DATA):
+                for name in fmt.FILES:
                     (self.directory / name).unlink(missing_ok=True)
             elif (self.directory / fmt.HEADER).exists():
                 raise FileExistsError

@@ -54,7 +54,7 @@ def replay(directory: Path) -> Replay:
         ScenarioError: The scenario cannot be used.
     """
     recording = load(directory)
-    path = directory / SCENARIO
+    path = recording.directory / SCENARIO
     if not path.is_file():
         raise RecordingError(f"{directory}: there is no {SCENARIO} beside the recording")
     scenario = load_scenario(path)

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from pathlib import Path
 from typing import NamedTuple
@@ -32,7 +32,7 @@ except ImportError as error:
 
 from opspace.robots.mujoco_model import mujoco_model
 
-__all__ = ["SnapshotUnavailableError", "snapshot_strip", "snapshots"]
+__all__ = ["SnapshotUnavailableError", "render", "snapshot_strip", "snapshots"]
 
 SIZE = (480, 420)
 TARGET_COLOR = (0.87, 0.18, 0.14, 0.75)
@@ -85,6 +85,37 @@ def snapshots(
         ModelError: The robot was not read from a file.
         UnknownNameError: The recording has no position of one of the robot's joints.
     """
+    return list(render(recording, robot, times, size=size, task=task, direction=direction))
+
+
+def render(
+    recording: Recording,
+    robot: Robot,
+    times: Sequence[float],
+    *,
+    size: tuple[int, int] = SIZE,
+    task: str = "position",
+    direction: tuple[float, float] | None = None,
+) -> Iterator[np.ndarray]:
+    """Render like `snapshots`, one picture after the other, for more than memory would hold.
+
+    Args:
+        recording: See `snapshots`.
+        robot: See `snapshots`.
+        times: See `snapshots`.
+        size: See `snapshots`.
+        task: See `snapshots`.
+        direction: See `snapshots`.
+
+    Yields:
+        (height, width, 3) uint8 image for each time.
+
+    Raises:
+        SnapshotUnavailableError: See `snapshots`.
+        InputError: See `snapshots`.
+        ModelError: See `snapshots`.
+        UnknownNameError: See `snapshots`.
+    """
     if robot.source is None:
         raise ModelError(f"robot {robot.name!r} was not read from a file that MuJoCo could render")
     if not times or not len(recording):
@@ -94,14 +125,13 @@ def snapshots(
     model.vis.map.shadowclip, model.vis.quality.shadowsize = 4.0, 8192
     data = mujoco.MjData(model)
     ticks = [_tick(model, recording, time, task) for time in times]
-    view, images = _choose_view(model, data, ticks, size, direction), []
+    view = _choose_view(model, data, ticks, size, direction)
     with canvas(model, size) as drawing:
         for tick in ticks:
             data.qpos[:] = tick.qpos
             mujoco.mj_forward(model, data)
             _draw(drawing, data, tick, view)
-            images.append(drawing.pixels())
-    return images
+            yield drawing.pixels()
 
 
 def snapshot_strip(
