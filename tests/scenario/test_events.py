@@ -124,3 +124,16 @@ def test_an_event_that_cannot_happen_is_named(events, place, says):
     with pytest.raises(ScenarioError, match=says) as raised:
         build(short(tasks=TASKS, events=events))
     assert raised.value.key == f"events[{place}]"
+
+
+def test_a_task_that_is_not_present_waits_until_it_is_asked_for():
+    tasks = {
+        **HOLD["tasks"],
+        "guest": {"type": "joint", "joint": "joint1", "level": 1, "present": False},
+    }
+    built = build(short(tasks=tasks))
+    assert "guest" in built.tasks
+    assert "guest" not in [task.name for task in built.stack]
+    built.stack.insert(built.tasks["guest"], level=0.5)
+    built.controller.step(0.0, built.plant.q, built.plant.v)
+    assert built.stack.levels_by_number[0.5] == (built.tasks["guest"],)

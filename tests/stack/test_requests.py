@@ -203,14 +203,3 @@ def test_a_tick_never_waits_for_a_request(stack, tasks):
     assert {m.task.name for m in stack.begin_tick(0.125)} == {"a", "b"}
     leave.set()
     thread.join()
-
-
-def test_a_stack_tells_what_waits_to_come():
-    stack = Stack([PositionTask()])
-    guest = JointTask("joint3", name="guest")
-    stack.insert(guest, level=0.5, start_time=3.0)
-    assert stack.coming == {"guest": 0.5}
-    stack.begin_tick(2.0)
-    assert stack.coming == {"guest": 0.5}
-    stack.begin_tick(3.0)
-    assert stack.coming == {}

@@ -45,10 +45,8 @@ duration: 1.0
 tasks:
   orientation: {type: orientation, level: 0}
   position: {type: position, level: 1, max_speed: 0.6}
-  elbow: {type: joint, joint: joint3, level: 1}
-  posture: {type: posture, level: 2, kp: 30}
-events:
-  - {at: 3000.0, insert: elbow, level: 1.5}
+  elbow: {type: joint, joint: joint3, level: 2, present: false}
+  posture: {type: posture, level: 3, kp: 30}
 """
 PICTURES = Path(os.environ.get("OPSPACE_SCREENSHOTS", ""))
 """Where screenshots are kept to be looked at; not at all where the variable is not set."""

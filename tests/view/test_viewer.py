@@ -24,12 +24,11 @@ from tests.scenario.short import HOLD, short
 pytestmark = pytest.mark.xdist_group("viewer")
 
 DURATION = 0.6
-GUEST = {"type": "joint", "joint": "joint3", "level": 1}
-EVENTS = [{"at": 0.5, "insert": "guest", "level": 0.5, "duration": 0.1}]
+GUEST = {"type": "joint", "joint": "joint3", "level": 1, "present": False}
 
 
 def scenario():
-    return short(duration=DURATION, tasks={**HOLD["tasks"], "guest": GUEST}, events=EVENTS)
+    return short(duration=DURATION, tasks={**HOLD["tasks"], "guest": GUEST})
 
 
 def watch(out, during=lambda viewer, address: None, **options):

@@ -36,8 +36,7 @@ def subject_of(controller: ReferenceController, tasks: Sequence[Task] = ()) -> d
         for number, level in stack.levels_by_number.items()
         for task in level
     }
-    coming = stack.coming
-    found.update({task.name: _task(task, coming.get(task.name)) for task in tasks})
+    found.update({task.name: _task(task, None) for task in tasks})
     return {"robot": _robot(controller), "tasks": found}
 
 

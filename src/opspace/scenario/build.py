@@ -136,7 +136,7 @@ def _start(scenario: Scenario, robot: Robot) -> np.ndarray:
 
 
 def _levels(scenario: Scenario, tasks: Mapping[str, Task]) -> dict[float, list[Task]]:
-    late = late_tasks(scenario.events)
+    late = late_tasks(scenario.events, scenario.tasks)
     by_level: dict[float, list[Task]] = {}
     for name, entry in scenario.tasks.items():
         if name not in late:

@@ -32,7 +32,7 @@ KINDS: Mapping[type[entries.TaskEntry], type[TrackingTask]] = {
     entries.RelativePose: tasks.RelativePoseTask,
 }
 
-_NOT_OPTIONS = ("type", "level", "target")
+_NOT_OPTIONS = ("type", "level", "present", "target")
 
 
 def build_tasks(scenario: Scenario, robot: Robot) -> dict[str, TrackingTask]:

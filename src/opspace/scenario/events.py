@@ -105,18 +105,19 @@ def in_order(events: Sequence[Event]) -> list[tuple[int, Event]]:
     return sorted(enumerate(events), key=lambda found: found[1].at)
 
 
-def late_tasks(events: Sequence[Event]) -> frozenset[str]:
-    """Find the tasks that are not in the stack at the start: their first event inserts them."""
+def late_tasks(events: Sequence[Event], tasks: Mapping[str, AnyTask]) -> frozenset[str]:
+    """Find the tasks that are not in the stack at the start: they say so, or an event inserts them."""
     first: dict[str, Event] = {}
     for _, event in in_order(events):
         for name in event.tasks:
             first.setdefault(name, event)
-    return frozenset(name for name, event in first.items() if event.kind == "insert")
+    inserted = {name for name, event in first.items() if event.kind == "insert"}
+    return frozenset(inserted | {name for name, entry in tasks.items() if not entry.present})
 
 
 def levels_visited(events: Sequence[Event], tasks: Mapping[str, AnyTask]) -> dict[float, list[str]]:
     """List, by number of the level, the tasks that are ever there, most important first."""
-    late = late_tasks(events)
+    late = late_tasks(events, tasks)
     level = {name: float(entry.level) for name, entry in tasks.items()}
     visits = [(number, name) for name, number in level.items() if name not in late]
     for _, event in in_order(events):

@@ -100,7 +100,7 @@ def header_of(scenario: Scenario) -> dict[str, object]:
 
 def late_tasks_of(built: Built) -> list[Task]:
     """List the tasks that are not in the stack at the start."""
-    late = late_tasks(built.scenario.events)
+    late = late_tasks(built.scenario.events, built.scenario.tasks)
     return [task for name, task in built.tasks.items() if name in late]
 
 

@@ -37,6 +37,10 @@ class TaskEntry(Entry):
     """What every task has."""
 
     level: Annotated[int, Checked(whole)] = Field(description="priority, 0 is the highest")
+    present: bool = Field(
+        default=True,
+        description="whether it is in the stack at the start; one that an event inserts first is not",
+    )
     kp: Stiffness = Field(default=100.0, description="stiffness [1/s²], a number or one per row")
     kv: Damping | None = Field(
         default=None, description="damping [1/s]; null is critical, 2 sqrt(kp)"

@@ -92,11 +92,6 @@ class Stack:
         }
 
     @property
-    def coming(self) -> dict[str, float]:
-        """Levels at which tasks will be inserted whose time has not come, by name of the task."""
-        return self._transitions.coming()
-
-    @property
     def settled(self) -> bool:
         """Whether no transition was on its way or due at the last tick; later ones may wait."""
         return self._transitions.settled()

@@ -56,12 +56,6 @@ class Transitions:
         with self._lock:
             return [(member.level, member.task) for member in self._members.values()]
 
-    def coming(self) -> dict[str, float]:
-        """Give the level of every task that waits for its time to be inserted, by its name."""
-        with self._lock:
-            waiting = [q.request for q in self._queue if isinstance(q.request, Insert)]
-            return {request.task.name: request.level for request in reversed(waiting)}
-
     def settled(self) -> bool:
         """Tell whether at the last tick nothing was on its way or due."""
         with self._lock:

@@ -98,12 +98,17 @@ class StackControls:
         server: The server of the page.
         ask: Takes messages to the run.
         tasks: What the recording says about the tasks.
+        homes: Level where each task belongs, as far as it is known.
     """
 
     def __init__(
-        self, server: viser.ViserServer, ask: Ask, tasks: Mapping[str, Mapping[str, Any]]
+        self,
+        server: viser.ViserServer,
+        ask: Ask,
+        tasks: Mapping[str, Mapping[str, Any]],
+        homes: Mapping[str, float],
     ) -> None:
-        self._ask, self._tasks = ask, tasks
+        self._ask, self._tasks, self._homes = ask, tasks, homes
         names = tuple(tasks)
         first, second = names[0], names[1 % len(names)]
         self._task = server.gui.add_dropdown("Task", names, initial_value=first)
@@ -147,8 +152,7 @@ class StackControls:
         self._kp.value = self._stiffness(self._task.value)
 
     def _home(self, name: str) -> float:
-        level = self._tasks[name]["level"]
-        return 0.0 if level is None else float(level)
+        return self._homes.get(name, 0.0)
 
     def _stiffness(self, name: str) -> float:
         kp = self._tasks[name]["kp"]

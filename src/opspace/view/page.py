@@ -154,7 +154,8 @@ class Page:
             self._bars = gui.add_html("")
             if ask is not None:
                 gui.add_divider()
-                self._controls = StackControls(self._server, ask, self._about["tasks"])
+                homes = _homes(self._about)
+                self._controls = StackControls(self._server, ask, self._about["tasks"], homes)
         with tabs.add_tab("Joints"):
             self._joints = gui.add_html("")
         with tabs.add_tab("Charts"):
@@ -183,3 +184,12 @@ def _robot(about: dict[str, Any]) -> Robot:
             f"robot {found.name!r} has {found.nv} joints now, the recording {len(about['joints'])}"
         )
     return found
+
+
+def _homes(about: dict[str, Any]) -> dict[str, float]:
+    """Return the level of every task: where it is at the start, or where its scenario puts it."""
+    levels = {name: task["level"] for name, task in about["tasks"].items()}
+    for name, entry in about.get("scenario", {}).get("tasks", {}).items():
+        if levels.get(name) is None:
+            levels[name] = entry.get("level")
+    return {name: float(level) for name, level in levels.items() if level is not None}
