@@ -15,6 +15,7 @@ from mkdocs.structure.pages import Page
 INLINE = re.compile(r'<span class="arithmatex">\\\((.+?)\\\)</span>', re.DOTALL)
 BLOCK = re.compile(r'<div class="arithmatex">\s*\\\[(.+?)\\\]\s*</div>', re.DOTALL)
 TAG = re.compile(r"\\tag\{(.+?)\}")
+SPACE = re.compile(r"(?<!\\)\\ ")  # the converter would show it as text
 FONT = resources.files("ziamath") / "fonts" / "STIXTwoMath-Regular.ttf"
 # Signs that the converter chooses less well than TeX does.
 BETTER = {"<mi>&#x029F5;</mi>": "<mo>&#x2216;</mo>", "&#x0002A;": "&#x2217;"}
@@ -39,7 +40,7 @@ def block(formula: str) -> str:
     """Set a formula on a line of its own, its number at the right."""
     tag = TAG.search(formula)
     number = f"<span>({tag[1]})</span>" if tag else ""
-    formula = TAG.sub("", formula).replace("\\ ", "\\;")  # the converter shows "\ " as text
+    formula = SPACE.sub(r"\\;", TAG.sub("", formula))
     return f'<div class="formula">{mathml(formula, "block")}{number}</div>'
 
 
