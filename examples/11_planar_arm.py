@@ -25,9 +25,9 @@ def arm(q, v):
 
 start = arm(q, v)[2]
 far = np.array([1.6, 0.0])  # m from the base, while the arm ends at 1.2 m
-there = osc.MinimumJerk(start, far, 1.5)
-path = osc.Chain((0.0, there), (2.0, osc.MinimumJerk(far, start, 1.5, start_time=2.0)))
-times, torques, sigmas = np.arange(0.0, 4.0, DT), [], []
+there = osc.MinimumJerk(start, far, 2.0)
+path = osc.Chain((0.0, there), (2.5, osc.MinimumJerk(far, start, 2.0, start_time=2.5)))
+times, torques, sigmas = np.arange(0.0, 5.0, DT), [], []
 for t in times:
     M, bias, tip, J, drift = arm(q, v)
     x, dx, ddx = path(t)
@@ -36,7 +36,7 @@ for t in times:
         osc.TaskSet(J, wanted - drift, priority=0),
         osc.TaskSet(np.eye(4), 25.0 * (home - q) - 10.0 * v, priority=1),
     ]
-    tau = osc.task_torque(M, tasks, singular=osc.SigmaBuffer(0.1, 0.6)) + bias
+    tau = osc.task_torque(M, tasks, singular=osc.SigmaBuffer(0.05, 0.25)) + bias
     torques.append(tau)
     sigmas.append(np.linalg.eigvalsh(J @ np.linalg.solve(M, J.T))[0])
     v = v + DT * np.linalg.solve(M, tau - bias)

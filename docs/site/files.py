@@ -33,7 +33,9 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
 
 def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Files) -> str:
     """Lead links to files of the repository to their pages."""
-    return moved(markdown, f"docs/{PurePosixPath(page.file.src_uri).parent}", page.file.src_uri, files)
+    return moved(
+        markdown, f"docs/{PurePosixPath(page.file.src_uri).parent}", page.file.src_uri, files
+    )
 
 
 def links_of(text: str) -> list[tuple[str, str]]:

@@ -10,8 +10,6 @@ from pathlib import Path
 
 import pytest
 import typer
-
-from opspace import cli
 from tests.docs.pages import (
     DOCS,
     PAGES,
@@ -23,6 +21,8 @@ from tests.docs.pages import (
     prose_of,
     targets_of,
 )
+
+from opspace import cli
 
 # The blocks of a page in their order and in one folder, as a reader would: a block with a title is
 # saved, Python shares one namespace, and commands that are quick are run. In a process of its own:
@@ -133,7 +133,7 @@ def check_command(line):
     elif words[0] == "python":
         assert (ROOT / words[1]).is_file(), line
     else:
-        assert words[0] == "taskset" and words[-1] == "my_robot.py", line
+        assert (words[0], words[-1]) == ("taskset", "my_robot.py"), line
 
 
 @pytest.mark.parametrize("page", [page for page in PAGES if commands_of(page)], ids=name_of)
@@ -144,7 +144,7 @@ def test_commands_and_their_options_exist(page):
 
 @pytest.mark.parametrize("line", ["opspace run a.yaml --otu b", "opspace rnu a.yaml", "make tset"])
 def test_a_command_that_does_not_exist_is_noticed(line):
-    with pytest.raises(Exception, match="(?i)no such option|rnu|^$|assert"):
+    with pytest.raises((typer.BadParameter.__bases__[0], KeyError, AssertionError)):
         check_command(line)
 
 
