@@ -1,7 +1,6 @@
 """Hook of the site: the page of the command line is what the commands' own help says."""
 
 import io
-import os
 from contextlib import redirect_stdout
 
 from mkdocs.config.defaults import MkDocsConfig
@@ -28,8 +27,7 @@ def commands() -> str:
 
 
 def help_of(*words: str) -> str:
-    """Give the help of a command as a terminal of 100 columns shows it."""
-    os.environ["TERMINAL_WIDTH"] = os.environ["COLUMNS"] = "100"
+    """Give the help of a command as a terminal shows it."""
     with redirect_stdout(io.StringIO()) as text:
         app([*words, "--help"], prog_name="opspace", standalone_mode=False)
     return text.getvalue().strip()

@@ -16,6 +16,7 @@ INLINE = re.compile(r'<span class="arithmatex">\\\((.+?)\\\)</span>', re.DOTALL)
 BLOCK = re.compile(r'<div class="arithmatex">\s*\\\[(.+?)\\\]\s*</div>', re.DOTALL)
 TAG = re.compile(r"\\tag\{(.+?)\}")
 SPACE = re.compile(r"(?<!\\)\\ ")  # the converter would show it as text
+BARE = re.compile(r"\\mathbb (\w)")  # the converter wants braces
 FONT = resources.files("ziamath") / "fonts" / "STIXTwoMath-Regular.ttf"
 # Signs that the converter chooses less well than TeX does.
 BETTER = {"<mi>&#x029F5;</mi>": "<mo>&#x2216;</mo>", "&#x0002A;": "&#x2217;"}
@@ -46,6 +47,7 @@ def block(formula: str) -> str:
 
 def mathml(formula: str, display: str) -> str:
     """Convert a formula of LaTeX."""
+    formula = BARE.sub(r"\\mathbb{\1}", formula)
     found = convert(formula, display=display)
     for sign, better in BETTER.items():
         found = found.replace(sign, better)
