@@ -5,11 +5,12 @@ BIN := $(VENV)/bin
 INSTALLED := $(VENV)/.installed
 BENCH := .venv-bench
 
-.PHONY: help test lint test-slow test-browser reproduce comparison bench constraints clean
+.PHONY: help test lint docs test-slow test-browser reproduce comparison bench constraints clean
 
 help:
 	@echo "make reproduce   the two experiments of the paper: tables and figures in results/"
-	@echo "make test        lint, types, import rules and the default test suite"
+	@echo "make test        lint, types, import rules, the documents and the default test suite"
+	@echo "make docs        the documents as a site in results/site, warnings are errors"
 	@echo "make test-slow   campaigns that take minutes"
 	@echo "make test-browser the viewer in headless Chromium, which must be installed"
 	@echo "make comparison  run other methods on the show-piece; rewrites the tables in the documents"
@@ -29,7 +30,11 @@ lint: $(INSTALLED)
 	$(BIN)/basedpyright
 	$(BIN)/lint-imports --no-cache
 
-test: lint
+docs: $(INSTALLED)
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
+	@echo "results: results/site/index.html"
+
+test: lint docs
 	$(BIN)/python -m pytest -n 2
 
 test-slow: $(INSTALLED)

@@ -73,6 +73,8 @@ if TYPE_CHECKING:
     from opspace.tasks import TaskTerms as TaskTerms
     from opspace.tasks import TrackingTask as TrackingTask
     from opspace.tasks import ViaPoints as ViaPoints
+    from opspace.view import RunRequest as RunRequest
+    from opspace.view import Viewer as Viewer
 
 _NAMES = {
     "opspace.controller": (
@@ -97,6 +99,7 @@ _NAMES = {
         "RelativeOrientationTask RelativePoseTask RelativePositionTask Sample Task TaskTerms "
         "TrackingTask ViaPoints"
     ),
+    "opspace.view": "RunRequest Viewer",
 }
 _HOME = {name: module for module, names in _NAMES.items() for name in names.split()}
 

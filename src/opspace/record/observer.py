@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from opspace.controller import Command, LevelStatus, ReferenceController
+from opspace.controller import Command, LevelStatus, ReferenceController, TaskStatus
 from opspace.errors import InputError
 from opspace.record.format import Column, Ended
 from opspace.record.subject import subject_of
@@ -153,8 +153,7 @@ class TickRecorder:
             if found is None:
                 parts += [[np.nan, np.nan], _padded(_NOTHING, rows)]
             else:
-                level = sum(number * weight for number, weight in found.levels)
-                parts += [[found.activation, level], _padded(found.error, rows)]
+                parts += [[found.activation, _level(found)], _padded(found.error, rows)]
         levels = {level.level: level for level in command.levels}
         for number, size in self._levels.items():
             level = levels.get(number)
@@ -184,6 +183,14 @@ class TickRecorder:
     def close(self, how: Ended = "completed", reason: str = "") -> None:
         """Finish the recording and say how the run ended."""
         self._recorder.close(how, reason)
+
+
+def _level(found: TaskStatus) -> float:
+    """Return the number of a task's level, exactly where it is at one."""
+    if len(found.levels) == 1:
+        return found.levels[0][0]
+    whole = sum(weight for _, weight in found.levels)
+    return sum(number * weight for number, weight in found.levels) / whole if whole else np.nan
 
 
 def _truth_columns(controller: ReferenceController) -> list[Column]:

@@ -30,13 +30,19 @@ class Chart:
         server: The server of the page.
         reader: Where the numbers come from.
         title: What the chart shows, with its unit.
-        columns: Names of the columns by their label.
+        columns: Names of columns by the label of their line, which shows the smallest of them.
     """
 
     def __init__(
-        self, server: viser.ViserServer, reader: FrameReader, title: str, columns: dict[str, str]
+        self,
+        server: viser.ViserServer,
+        reader: FrameReader,
+        title: str,
+        columns: dict[str, list[str]],
     ) -> None:
-        self._reader, self._columns = reader, list(columns.values())
+        self._reader = reader
+        self._columns = [name for names in columns.values() for name in names]
+        self._starts = np.cumsum([0, *(len(names) for names in columns.values())])[:-1]
         series = [uplot.Series(label="time [s]")]
         for i, label in enumerate(columns):
             color = COLORS[i % len(COLORS)]
@@ -58,19 +64,20 @@ class Chart:
 
     def _data(self, row: int) -> tuple[np.ndarray, ...]:
         history = self._reader.history(row, SECONDS, POINTS, self._columns)
-        return tuple(history.T.copy())
+        # What is not there is nan, which this minimum passes over.
+        lines = np.fmin.reduceat(history[:, 1:], self._starts, axis=1)
+        return (history[:, 0].copy(), *lines.T.copy())
 
 
-def torque_columns(reader: FrameReader) -> dict[str, str]:
+def torque_columns(reader: FrameReader) -> dict[str, list[str]]:
     """List the torques by the name of the joint."""
-    return {short(name, reader.joints): f"tau/{name}" for name in reader.joints}
+    return {short(name, reader.joints): [f"tau/{name}"] for name in reader.joints}
 
 
-def sigma_columns(reader: FrameReader) -> dict[str, str]:
-    """List the weakest singular value of every level that has directions in the world."""
-    found = {}
-    for level in reader.at(0).levels if len(reader.recording.data) else ():
-        if not math.isnan(level.weakest[0]):
-            prefix = f"levels/{level.number:g}/sigma"
-            found[f"level {level.number:g}"] = reader.recording.group(prefix)[-1]
-    return found
+def sigma_columns(reader: FrameReader) -> dict[str, list[str]]:
+    """List the singular values of every level that has directions in the world."""
+    return {
+        f"level {level.number:g}": reader.recording.group(f"levels/{level.number:g}/sigma")
+        for level in reader.at(0).levels
+        if not math.isnan(level.weakest[0])
+    }

@@ -162,7 +162,7 @@ class StackControls:
 def answer(what: str, reason: str) -> str:
     """Write what became of a request."""
     color = "#BB5566" if reason else "#8c8c8c"
-    text = f"{what}: {reason}" if reason else what
+    text = f"{what}: {reason}" if reason else f"{what}: done" if what else ""
     return (
         '<div data-opspace="answer" style="font-size:12px;line-height:16px;min-height:32px;'
         f'padding:0 12px;color:{color}">{escape(text)}</div>'

@@ -165,9 +165,11 @@ class Page:
         reader = self._reader
         while not reader.recording.refresh():
             time.sleep(1.0 / PICTURES)
-        charts = [Chart(self._server, reader, "torque [N·m]", torque_columns(reader))]
+        charts = [Chart(self._server, reader, "torque [N·m] over time [s]", torque_columns(reader))]
         if weakest := sigma_columns(reader):
-            charts.append(Chart(self._server, reader, "weakest σ of a level", weakest))
+            charts.append(
+                Chart(self._server, reader, "weakest σ of a level [1] over time [s]", weakest)
+            )
         return charts
 
     def _drag(self, task: str, place: dict[str, tuple[float, ...]]) -> None:
