@@ -105,7 +105,8 @@ class Scene:
         reach = max(float(np.ptp(points, axis=0).max()), 0.5)
         camera = self._server.initial_camera
         camera.look_at = centre
-        camera.position = centre + reach * np.array([1.1, -1.1, 0.6])
+        # From the side: arms reach forward.
+        camera.position = centre + reach * np.array([0.9, -1.9, 0.8])
         self._looking = True
 
     def _show_directions(self, levels: Sequence[LevelFrame], tool: np.ndarray) -> None:
