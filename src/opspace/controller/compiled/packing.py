@@ -84,7 +84,7 @@ def refresh(tasks: list[Packed], robot: AdapterBase, t: float) -> None:
     """Bring the arrays up to date with the tasks at time ``t`` [s].
 
     Args:
-        tasks: Packed tasks.
+        tasks: The tasks.
         robot: The robot at the present state.
         t: Time, s.
 
@@ -93,7 +93,7 @@ def refresh(tasks: list[Packed], robot: AdapterBase, t: float) -> None:
     """
     for packed in tasks:
         task = packed.task
-        # Most ticks find everything as it was; its activation may be assigned at any time.
+        # Most ticks find everything as it was; an activation may be assigned at any time.
         if (
             packed.moving
             or task.activation is not None

@@ -16,12 +16,10 @@ class Space(NamedTuple):
     The first axis of the arrays in the first group is the depth: what the levels above have decided.
 
     Attributes:
-        Z: (D + 1, n, n) basis of the motions still free, vectors as columns; the identity while all
-            are.
+        Z: (D + 1, n, n) basis of the motions still free, vectors as rows; the identity while all are.
         u: (D + 1, n) whitened torque so far.
         free: (D + 1,) number of motions still free.
-        V: (D + 1, n, n) directions of a level that branches as columns, strongest first, then what
-            it leaves.
+        V: (D + 1, n, n) directions of a level that branches, strongest first, then what it leaves.
         strength: (D + 1, n) what each direction adds to the torque.
         share: (D + 1, n + 1) weight of the alternative with that many directions.
         path: (D + 1,) weight of the branch that led here.
@@ -43,7 +41,6 @@ class Space(NamedTuple):
         Y: (n, n) right singular vectors.
         x: (n,) scratch.
         y: (R,) scratch.
-        row: (n,) scratch.
         scale: (n,) scratch.
         sigma: (n,) singular values.
         kept: (rows, n) B of each level when ``top`` was found, from row ``first_kept`` of it on.
@@ -81,7 +78,6 @@ class Space(NamedTuple):
     Y: np.ndarray
     x: np.ndarray
     y: np.ndarray
-    row: np.ndarray
     scale: np.ndarray
     sigma: np.ndarray
     kept: np.ndarray
@@ -124,7 +120,6 @@ def make_space(n: int, depth: int, rows: int) -> Space:
         Y=np.zeros((n, n)),
         x=np.zeros(most),
         y=np.zeros(most),
-        row=np.zeros(n),
         scale=np.zeros(most),
         sigma=np.zeros(n),
         kept=np.zeros((R, n)),

@@ -99,16 +99,15 @@ def _leaf(d, n, weights, rest, s, u):
         u[a] += share * U[d, a]
     if rest[n] == 0.0:
         return
-    x, along, r = s.x, s.row, s.free[d]
-    for b in range(r):
-        along[b] = 0.0
-    for a in range(n):
-        for b in range(r):
-            along[b] += rest[a] * Z[d, a, b]
+    x = s.x
     for a in range(n):
         x[a] = 0.0
-        for b in range(r):
-            x[a] += Z[d, a, b] * along[b]
+    for k in range(s.free[d]):
+        along = 0.0
+        for a in range(n):
+            along += Z[d, k, a] * rest[a]
+        for a in range(n):
+            x[a] += along * Z[d, k, a]
     if s.motors[0] != 0:
         torque_of(s.inertia, x, s.part)
         scale = room_for(s.part, s.torque[d], s.limit)
@@ -169,9 +168,9 @@ def pass_on(d, n, s):
     s.free[d + 1] = r
     for a in range(n):
         u[d + 1, a] = u[d, a]
-    for a in range(n):
-        for b in range(r):
-            Z[d + 1, a, b] = Z[d, a, b]
+    for k in range(r):
+        for a in range(n):
+            Z[d + 1, k, a] = Z[d, k, a]
     if s.motors[0] != 0:
         for a in range(n):
             s.torque[d + 1, a] = s.torque[d, a]
