@@ -7,6 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from opspace.law import excess, nearest_acceleration
+from opspace.law.compiled.inertia import factor, inertia_handle, make_inertia
 from opspace.law.compiled.nearest import bounds_handle, make_bounds
 from opspace.law.compiled.nearest import nearest_acceleration as compiled
 
@@ -79,7 +80,9 @@ def test_compiled_is_readable(seed, contradictory):
     given_ = make_bounds(x.size)
     for array, values in zip(given_, bounds, strict=False):
         array[:] = values
-    compiled(L, x, bounds_handle(given_))
+    inertia = inertia_handle(make_inertia(np.arange(x.size) - 1))
+    assert factor(L @ L.T, inertia)
+    compiled(inertia, x, bounds_handle(given_))
     readable = nearest_acceleration(L, start, *bounds)
     assert np.allclose(x, readable, rtol=1e-6, atol=1e-5)
 

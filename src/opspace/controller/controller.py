@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -24,10 +25,10 @@ from opspace.controller.compiled.layout import (
 )
 from opspace.controller.compiled.plan import Plan
 from opspace.controller.compiled.report import CompiledReport
-from opspace.controller.compiled.tick import tick
-from opspace.controller.compiled.warm_up import compiled_batch, compiled_tick
+from opspace.controller.compiled.warm_up import compiled_batch, compiled_tick, tick_entry
 from opspace.controller.tick import ReferenceController
 from opspace.errors import InputError
+from opspace.law.compiled.handle import Handle
 from opspace.law.compiled.profiles import PROFILE_CODE
 from opspace.robots.base import AdapterBase
 from opspace.robots.dynamics import make_dynamics
@@ -36,6 +37,7 @@ from opspace.robots.rigid_model import RigidModel
 from opspace.stack import Member
 
 STATUSES = tuple(Status(bits) for bits in range(2048))
+NEW = tuple.__new__
 TIME_JUMP, FAULT = int(Status.TIME_JUMP), int(Status.FAULT)
 
 
@@ -54,60 +56,56 @@ class Controller(ReferenceController):
     _plan: Plan | None = None
     _bodies: RigidModel | None = None
     _batch: Batch | None = None
+    _tick: Callable[[float, Handle], int]
 
     def step(self, t: float, q: ArrayLike, v: ArrayLike) -> Command:
         """Compute the torque for one state; see `ReferenceController.step`."""
         axes = self._axes
         if axes is None:
-            axes = self._axes = self._compiled_robot()
+            self.warm_up()
+            axes = self._axes
             if axes is None:
                 return super().step(t, q, v)
-            compiled_tick()
         t = float(t)
         if not math.isfinite(t):
             raise InputError(f"time must be finite, got {t}")
         robot: AdapterBase = self.robot  # pyright: ignore[reportAssignmentType]
-        q, v = _vector(q), _vector(v)
-        if q.shape != axes.q.shape or v.shape != axes.v.shape:
-            robot.check_state(q, v)
         robot.place(q, v)
         if self._bodies is None:
             robot.catch_up()
         timing = 0  # a number: the operators of flags cost as much as all of Python here
         if self._timing is not None:
-            robot.check_state(q, v)
-            timing = int(self._timing.check(t, q, v))
+            robot.check_state(robot.q, robot.v)
+            timing = int(self._timing.check(t, robot.q, robot.v))
             if timing & TIME_JUMP and self._holds:
                 return self._hold(t, STATUSES[timing])
         members = self.stack.begin_tick(t)
         plan = self._plan
         if plan is None or members is not plan.members:
             if not Plan.fits(members):
-                return super().step(t, q, v)
+                return super().step(t, robot.q, robot.v)
             plan = self._plan = self._planned(members, axes)
         plan.refresh(robot, t)
-        answer = tick(t, plan.handle) if self._observer is None else self._learn(t, v, plan)
+        answer = self._tick(t, plan.handle) if self._observer is None else self._learn(t, plan)
         if answer < 0:
             if answer == STATE_NOT_FINITE:
-                robot.check_state(q, v)
+                robot.check_state(robot.q, robot.v)
             return self._hold(t, STATUSES[timing | FAULT])
         found = plan.memory.copy()
-        command = Command(
-            t,
-            found[: plan.n],
-            STATUSES[answer % SOLVE | timing],
-            answer // SOLVE,
-            CompiledReport(plan, found),
+        status = STATUSES[answer % SOLVE | timing]
+        # Half the time of the named tuple's own constructor.
+        command = NEW(
+            Command, (t, found[: plan.n], status, answer // SOLVE, CompiledReport(plan, found))
         )
         return command if self._handover is None else self._handed_over(command)
 
-    def _learn(self, t: float, v: np.ndarray, plan: Plan) -> int:
+    def _learn(self, t: float, plan: Plan) -> int:
         """Tick with joint limits that learn what the model does not explain."""
-        observer = self._observer
+        observer, v = self._observer, self.robot.v
         assert observer is not None
         observer.observe(t, v)
         plan.disturb(observer.acceleration)
-        answer = tick(t, plan.handle)
+        answer = self._tick(t, plan.handle)
         if answer >= 0:
             observer.remember(t, v, plan.tick.joint_acceleration)
         return answer
@@ -171,8 +169,12 @@ class Controller(ReferenceController):
         Returns:
             How long it took, s.
         """
-        axes = self._axes = self._axes or self._compiled_robot()
-        return 0.0 if axes is None else compiled_tick()
+        self._axes = self._axes or self._compiled_robot()
+        if self._axes is None:
+            return 0.0
+        seconds = compiled_tick()
+        self._tick = tick_entry()
+        return seconds
 
     def _compiled_robot(self) -> MotionAxes | None:
         """Give the robot's arrays: computed by compiled code where it can, else by its library."""
@@ -223,7 +225,3 @@ class Controller(ReferenceController):
         option[ROOM] = self._blending.room
         option[KEEP_TORQUE] = float(self.torque_limits == "priority")
         return option
-
-
-def _vector(value: ArrayLike) -> np.ndarray:
-    return value if type(value) is np.ndarray else np.asarray(value, dtype=float)

@@ -16,7 +16,7 @@ from opspace.controller.compiled.layout import (
     LIMIT_PROFILE,
     LIMIT_RETURN_SPEED,
 )
-from opspace.law.compiled.algebra import solve_lower, solve_lower_transposed
+from opspace.law.compiled.inertia import acceleration_of, whiten
 from opspace.law.compiled.jit import jit
 from opspace.law.compiled.nearest import nearest_acceleration
 from opspace.law.compiled.profiles import profile
@@ -113,12 +113,12 @@ def keep_bounds(k):
     x = k.joint_acceleration
     for a in range(n):
         x[a] = k.tau[a] - k.bias[a]
-    solve_lower(k.L, n, x)
-    solve_lower_transposed(k.L, n, x)
+    whiten(k.inertia, x)
+    acceleration_of(k.inertia, x)
     if not _excess(k) > BROKEN:
         return 0
     _bounds(k, n)
-    nearest_acceleration(k.L, x, k.bounds)
+    nearest_acceleration(k.inertia, x, k.bounds)
     for a in range(n):
         k.tau[a] = k.bias[a]
         for b in range(n):

@@ -8,6 +8,7 @@ import numpy as np
 
 from opspace.law.compiled.handle import Handle
 from opspace.law.compiled.nearest import bounds_handle, make_bounds
+from opspace.law.compiled.space import Space, space_handle
 from opspace.robots.motion_axes import MotionAxes
 
 # Kinds of tasks.
@@ -145,7 +146,6 @@ class Tick(NamedTuple):
     J: np.ndarray
     drift: np.ndarray
     fw: np.ndarray
-    L: np.ndarray
     velocity: np.ndarray
     acceleration: np.ndarray
     motion: np.ndarray
@@ -165,10 +165,19 @@ class Tick(NamedTuple):
     joint_acceleration: np.ndarray
 
 
-def tick_handle(t: Tick, space: Handle, axes: MotionAxes) -> Handle:
+def tick_handle(t: Tick, space: Space, axes: MotionAxes) -> Handle:
     """Make the handle with which compiled functions reach a `Tick`, its walk, and the robot."""
     bodies = Handle("RigidBodies", axes.bodies._asdict())
     dynamics = Handle("Dynamics", axes.dynamics._asdict())
     bounds = bounds_handle(make_bounds(t.v.size))
-    parts = {"space": space, "bodies": bodies, "dynamics": dynamics, "bounds": bounds}
-    return Handle("Tick", {**t._asdict(), **parts})
+    return Handle(
+        "Tick",
+        {
+            **t._asdict(),
+            "inertia": space.inertia,
+            "space": space_handle(space),
+            "bodies": bodies,
+            "dynamics": dynamics,
+            "bounds": bounds,
+        },
+    )

@@ -12,6 +12,7 @@ from opspace.controller.compiled.layout import (
     VARIABLE_SIZE,
     Tick,
 )
+from opspace.law.compiled.inertia import inertia_handle, make_inertia
 from opspace.law.compiled.space import Space, make_space
 from opspace.robots.motion_axes import MotionAxes
 
@@ -23,6 +24,7 @@ class Sizes(NamedTuple):
         n: Joints.
         tasks: Tasks.
         rows: Rows of all tasks.
+        slot_rows: Rows of all places of tasks.
         slots: Places of tasks.
         levels: Levels of the stack.
         variables: Activations in time.
@@ -33,6 +35,7 @@ class Sizes(NamedTuple):
     n: int
     tasks: int
     rows: int
+    slot_rows: int
     slots: int
     levels: int
     variables: int
@@ -61,7 +64,6 @@ class Block:
 
 def reported(size: Sizes, block: Block) -> dict[str, np.ndarray]:
     """Cut what a tick writes and a report reads, in the same order from every block."""
-    rows = size.rows + size.limits
     return {
         "tau": block.take(size.n),
         "h": block.take(size.tasks),
@@ -72,26 +74,14 @@ def reported(size: Sizes, block: Block) -> dict[str, np.ndarray]:
         "top": block.take(size.levels + 2),
         "chosen": block.take_integers(size.levels + 2),
         "width": block.take_integers(size.levels + 2),
-        "Jw": block.take(rows, size.n),
-        "basis": block.take(size.levels + 2, size.n, size.n),
+        "kept": block.take(size.slot_rows, size.n),
     }
 
 
 def reported_size(size: Sizes) -> int:
     """Numbers that `reported` takes."""
-    n, depth = size.n, size.levels + 2
-    rows = size.rows + size.limits
-    return (
-        n
-        + size.tasks
-        + size.slots
-        + size.rows
-        + size.limits
-        + 2
-        + 4 * depth
-        + rows * n
-        + (depth * n * n)
-    )
+    beside = size.n + size.tasks + size.slots + size.rows + size.limits
+    return beside + 4 * (size.levels + 2) + size.slot_rows * size.n
 
 
 def make_tick(
@@ -110,14 +100,13 @@ def make_tick(
     """
     block = Block(reported_size(size))
     kept = reported(size, block)
-    L = np.zeros((size.n, size.n))
     limit = np.array(torque_limit)  # one that may be written, like all the others
     space = make_space(size.n, size.levels + 1, size.rows + size.limits)._replace(
         top=kept.pop("top"),
         chosen=kept.pop("chosen"),
         width=kept.pop("width"),
-        basis=kept.pop("basis"),
-        factor=L,
+        kept=kept.pop("kept"),
+        inertia=inertia_handle(make_inertia(_before(axes))),
         limit=limit,
     )
     integers = np.int64
@@ -149,12 +138,17 @@ def make_tick(
         limit_joint=np.zeros(size.limits, integers),
         limit=np.zeros((size.limits, 7)),
         torque_limit=limit,
-        L=L,
         option=option,
         **kept,
         **_scratch(size),
     )
     return tick, space, block.memory
+
+
+def _before(axes: MotionAxes) -> np.ndarray:
+    """Return the coordinate before each one; an inertia that is not ours may couple any two."""
+    n = axes.v.size
+    return axes.parent if axes.bodies.kind.size else np.arange(n) - 1
 
 
 def _scratch(size: Sizes) -> dict[str, np.ndarray]:
@@ -165,6 +159,7 @@ def _scratch(size: Sizes) -> dict[str, np.ndarray]:
         "wanted": np.zeros(rows),
         "limit_wanted": np.zeros(limits),
         "J": np.zeros((rows, n)),
+        "Jw": np.zeros((rows + limits, n)),
         "drift": np.zeros(rows),
         "fw": np.zeros(rows + limits),
         "velocity": np.zeros((n, 6)),

@@ -80,6 +80,30 @@ def own_activation(task: Task, robot: AdapterBase, t: float) -> float:
     return h
 
 
+def refresh(tasks: list[Packed], robot: AdapterBase, t: float) -> None:
+    """Bring the arrays up to date with the tasks at time ``t`` [s].
+
+    Args:
+        tasks: The tasks.
+        robot: The robot at the present state.
+        t: Time, s.
+
+    Raises:
+        InputError: A reference or a task of the user's own gave unusable numbers.
+    """
+    for packed in tasks:
+        task = packed.task
+        # Most ticks find everything as it was; an activation may be assigned at any time.
+        if (
+            packed.moving
+            or task.activation is not None
+            or task._target is not packed.target
+            or task._held is not packed.held
+            or task._gains is not packed.gains
+        ):
+            packed.refresh(robot, t)
+
+
 class Packed:
     """One task in the arrays of a plan.
 
@@ -100,12 +124,13 @@ class Packed:
         self.index = index
         self.rows = slice(first, first + task.rows)
         self.own_kind = kind_of(task) == OWN
-        self.timed = False
+        self.moving = True
+        self._timed = False
         self._own_activation = False
         self._tick = tick
-        self._target: object = None
-        self._held: object = None
-        self._gains: object = None
+        self.target: object = None
+        self.held: object = None
+        self.gains: object = None
         kind = tick.kind[index]
         kind[:] = np.zeros(KIND_SIZE)
         kind[[KIND, FIRST_ROW, ROWS]] = kind_of(task), first, task.rows
@@ -128,7 +153,6 @@ class Packed:
             InputError: A reference or a task of the user's own gave unusable numbers.
         """
         task = self.task
-        # It may be assigned at any time, also where there was none.
         if task.activation is not None:
             robot.check_state(robot.q, robot.v)
             self._tick.own[self.index] = own_activation(task, robot, t)
@@ -139,12 +163,13 @@ class Packed:
         if self.own_kind:
             self._evaluate(robot, t)
         elif (
-            self.timed
-            or task._target is not self._target
-            or task._held is not self._held
-            or task._gains is not self._gains
+            self._timed
+            or task._target is not self.target
+            or task._held is not self.held
+            or task._gains is not self.gains
         ):
             self._pack(robot, t)
+        self.moving = self.own_kind or self._timed or self._own_activation
 
     def remember(self, before: Packed) -> None:
         """Go on from the same task in the plan before: which way round a rotation went."""
@@ -177,11 +202,11 @@ class Packed:
     def _pack(self, robot: AdapterBase, t: float) -> None:
         task, tick, rows = self.task, self._tick, self.rows
         target = task._target
-        if not self.timed:  # it may hold what it finds
+        if not self._timed:  # it may hold what it finds
             robot.check_state(robot.q, robot.v)
         gains = task._gains
         desired = task.desired(robot, t)
-        if gains is not self._gains:
+        if gains is not self.gains:
             tick.kp[rows], tick.kv[rows] = gains.kp, gains.kv
             limited = gains.max_speed is not None
             tick.kind[self.index, SPEED_LIMITED] = int(limited)
@@ -192,8 +217,8 @@ class Packed:
             tick.goal[rows, 0], tick.goal[rows, 1], tick.goal[rows, 2] = desired
         else:
             self._pack_goal(desired)
-        self._target, self._held, self._gains = target, task._held, gains
-        self.timed = callable(target.goal)
+        self.target, self.held, self.gains = target, task._held, gains
+        self._timed = callable(target.goal)
 
     def _pack_goal(self, desired: Any) -> None:
         number, quantity = self._tick.numbers[self.index], self._tick.kind[self.index, QUANTITY]

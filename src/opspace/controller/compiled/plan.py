@@ -22,10 +22,9 @@ from opspace.controller.compiled.layout import (
     tick_handle,
 )
 from opspace.controller.compiled.memory import Sizes, make_tick
-from opspace.controller.compiled.packing import Packed
+from opspace.controller.compiled.packing import Packed, refresh
 from opspace.controller.options import Scales
 from opspace.law.compiled.profiles import PROFILE_CODE
-from opspace.law.compiled.space import space_handle
 from opspace.robots.base import AdapterBase
 from opspace.robots.motion_axes import MotionAxes
 from opspace.stack import Member, Variable
@@ -73,6 +72,7 @@ class Plan:
             n=axes.v.size,
             tasks=len(members),
             rows=sum(member.task.rows for member in members),
+            slot_rows=sum(members[i].task.rows for _, i, _ in self.places),
             slots=len(self.places),
             levels=len(self.levels),
             variables=len(self.variables),
@@ -83,9 +83,12 @@ class Plan:
         self.packed = self._pack(scales)
         self._pack_variables()
         self._pack_slots()
+        self.first_kept = space.first_kept
+        depth, rows = self.tick.slots[:, 0], self.tick.slots[:, 2]
+        self.first_kept[:] = [rows[depth < d].sum() for d in range(self.first_kept.size)]
         if limits is not None:
             _pack_limits(limits, scales, self.tick)
-        self.handle = tick_handle(self.tick, space_handle(space), axes)
+        self.handle = tick_handle(self.tick, space, axes)
 
     @staticmethod
     def fits(members: Sequence[Member]) -> bool:
@@ -103,8 +106,7 @@ class Plan:
         Raises:
             InputError: A reference, activation or task gave unusable numbers.
         """
-        for packed in self.packed:
-            packed.refresh(robot, t)
+        refresh(self.packed, robot, t)
 
     def disturb(self, acceleration: np.ndarray) -> None:
         """Tell the joint limits what comes on top of the commanded accelerations, (n,) rad/s²."""

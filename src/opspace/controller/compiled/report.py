@@ -105,32 +105,27 @@ class CompiledReport:
         chosen = int(found["chosen"][depth])
         present = [s for s in here if chosen & slot_bit.py_func(s)]
         packed = [plan.packed[plan.places[s][1]] for s in present]
-        rows = np.concatenate([np.arange(p.rows.start, p.rows.stop) for p in packed])
-        free = int(found["width"][depth])
-        sigma, activation, directions = spectrum(
-            found["Jw"], rows, found["basis"][depth], free, plan.tick.option
-        )
+        first, rows = int(plan.first_kept[depth]), sum(p.task.rows for p in packed)
+        B = found["kept"][first : first + rows, : int(found["width"][depth])]
+        sigma, activation, directions = spectrum(np.array(B), plan.tick.option)
         names = tuple(p.task.name for p in packed)
         return LevelStatus(level, names, sigma, activation, directions, scale)
 
 
 @partial(jit, counted=True)
-def spectrum(Jw, rows, basis, free, option):
+def spectrum(B, option):
     """Directions of a level, strongest first: σ, activation, and vectors as columns (Eq. 25)."""
-    m, n = rows.size, Jw.shape[1]
+    m, free = B.shape
     k = min(m, free)
     wide = m <= free
     # The smaller side is decomposed; the vectors of the rows come out on either.
     C = np.zeros((k, max(m, free)))
     for i in range(m):
         for b in range(free):
-            x = 0.0
-            for a in range(n):
-                x += Jw[rows[i], a] * basis[b, a]
             if wide:
-                C[i, b] = x
+                C[i, b] = B[i, b]
             else:
-                C[b, i] = x
+                C[b, i] = B[i, b]
     Y = np.zeros((k, k))
     sigma = np.zeros(k)
     singular_values(C, k, C.shape[1], Y, sigma)

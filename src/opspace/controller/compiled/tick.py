@@ -10,10 +10,12 @@ from opspace.controller.compiled.layout import (
     COVERS_ALL,
     DAMPING,
     FIRST_ROW,
+    JOINT,
     JOINTS,
     KEEP_TORQUE,
     KIND,
     LIMIT_WEIGHT,
+    MOTION,
     NOT_FINITE,
     NOT_POSITIVE_DEFINITE,
     PROFILE,
@@ -21,14 +23,24 @@ from opspace.controller.compiled.layout import (
     ROWS,
     SINGULAR,
     SOLVE,
+    SOURCE,
     STATE_NOT_FINITE,
     TASK_BIAS,
+    WORLD,
 )
 from opspace.controller.compiled.tasks import evaluate_tasks
-from opspace.law.compiled.algebra import cholesky, solve_lower, solve_lower_transposed
 from opspace.law.compiled.corners import corners, insert, sort_corners
+from opspace.law.compiled.inertia import (
+    acceleration_of,
+    factor,
+    torque_of,
+    unit_row,
+    whiten,
+    whiten_row,
+    whitened_of,
+)
 from opspace.law.compiled.jit import jit
-from opspace.law.compiled.level import solve_level, take_alternative
+from opspace.law.compiled.level import project, solve_level, take_alternative
 from opspace.law.compiled.profiles import ramp
 from opspace.law.compiled.walk import begin, keep_inside, pass_on, slot_bit, walk
 from opspace.robots.dynamics import evaluate
@@ -59,11 +71,10 @@ def tick(t, k):
         evaluate(k.bodies, k.q, k.v, k.dynamics)
     activations(t, k)
     evaluate_tasks(k)
-    n = k.v.shape[0]
-    if not cholesky(k.M, n, 0.0, k.L):
+    if not factor(k.M, k.inertia):
         return NOT_POSITIVE_DEFINITE
     stacks = blend(k)
-    whiten(k)
+    whiten_tasks(k)
     law(k, stacks, 0)
     solves = stacks
     if k.limit.shape[0] > 0:
@@ -142,14 +153,14 @@ def blend(k):
 
 
 @jit
-def whiten(k):
-    """Rows Ĵ = W J L⁻ᵀ and f̂ = W f̃ of every task, and what damps the rest."""
+def whiten_tasks(k):
+    """Rows Ĵ = W J U⁻ᵀ and f̂ = W f̃ of every task, and what damps the rest."""
     n = k.v.shape[0]
     if k.option[TASK_BIAS] != 0.0:
         # Eq. 3-4: f̃ = f* + η + ζ, the bias as an acceleration of each task.
         for a in range(n):
             k.drop[a] = k.bias[a]
-        solve_lower(k.L, n, k.drop)
+        whiten(k.inertia, k.drop)
     covered = False
     for i in range(k.kind.shape[0]):
         whiten_task(k, i, n)
@@ -163,15 +174,18 @@ def whiten(k):
 @jit
 def whiten_task(k, i, n):
     """Whiten the rows of task i."""
-    L, J, Jw, fw, weight = k.L, k.J, k.Jw, k.fw, k.row_weight
+    J, Jw, fw, weight = k.J, k.Jw, k.fw, k.row_weight
     first = k.kind[i, FIRST_ROW]
     for row in range(first, first + k.kind[i, ROWS]):
         if k.kind[i, KIND] == JOINTS:
-            unit_row(L, n, k.coordinate[row], weight[row], Jw[row])
+            unit_row(k.inertia, k.coordinate[row], weight[row], Jw[row])
         else:
             for a in range(n):
                 Jw[row, a] = weight[row] * J[row, a]
-            solve_lower(L, n, Jw[row])
+            if k.kind[i, KIND] == MOTION and k.kind[i, SOURCE] == WORLD:
+                whiten_row(k.inertia, k.kind[i, JOINT], Jw[row])
+            else:
+                whiten(k.inertia, Jw[row])
         fw[row] = weight[row] * (k.wanted[row] - k.drift[row])
         if k.option[TASK_BIAS] != 0.0:
             for a in range(n):
@@ -182,26 +196,11 @@ def whiten_task(k, i, n):
 def damp_rest(k, n):
     """q̈ = −d v of what is left, weighed by the inertia: its momentum decays at the rate d."""
     k.rest[n] = 1.0
+    whitened_of(k.inertia, k.v, k.rest)
     for a in range(n):
-        total = 0.0
-        for b in range(a, n):
-            total += k.L[b, a] * k.v[b]
-        k.rest[a] = -k.option[DAMPING] * total
+        k.rest[a] *= -k.option[DAMPING]
         if k.option[TASK_BIAS] != 0.0:
             k.rest[a] += k.drop[a]
-
-
-@jit
-def unit_row(L, n, j, weight, row):
-    """Whitened row of joint j: weight · e_jᵀ L⁻ᵀ."""
-    for a in range(j):
-        row[a] = 0.0
-    row[j] = weight / L[j, j]
-    for a in range(j + 1, n):
-        total = 0.0
-        for b in range(j, a):
-            total -= L[a, b] * row[b]
-        row[a] = total / L[a, a]
 
 
 @jit
@@ -249,7 +248,8 @@ def _under_limits(k, c, stacks, levels):
         s.path[1] = k.limit_weight[c]
         _walk(k, stacks, levels)
         return
-    alternatives = solve_level(0, count, n, k.Jw, k.fw, False, k.option, s)
+    project(0, count, n, k.Jw, k.fw, s)
+    alternatives = solve_level(0, count, n, k.Jw, False, k.option, s)
     if alternatives == 1:
         keep_inside(0, n, k.limit_weight[c], s)
     for i in range(alternatives):
@@ -301,7 +301,7 @@ def limit_corners(k):
 def limit_row(k, i, row, n):
     """Task set e_jᵀ q̈ = ± acceleration of a joint limit."""
     weight = k.option[LIMIT_WEIGHT]
-    unit_row(k.L, n, k.limit_joint[i], weight, k.Jw[row])
+    unit_row(k.inertia, k.limit_joint[i], weight, k.Jw[row])
     k.fw[row] = weight * k.limit[i, SIGN] * k.limit_wanted[i]
     if k.option[TASK_BIAS] != 0.0:
         for a in range(n):
@@ -310,28 +310,24 @@ def limit_row(k, i, row, n):
 
 @jit
 def accelerations(k):
-    """q̈ = A⁻¹ (Γ − b − g) (Eq. 1), from û = L⁻¹ Γ."""
+    """q̈ = A⁻¹ (Γ − b − g) (Eq. 1), from û = U⁻¹ Γ."""
     n = k.v.shape[0]
     for a in range(n):
         k.joint_acceleration[a] = k.u[a]
         if k.option[TASK_BIAS] != 0.0:
             k.joint_acceleration[a] -= k.drop[a]
-    solve_lower_transposed(k.L, n, k.joint_acceleration)
+    acceleration_of(k.inertia, k.joint_acceleration)
 
 
 @jit
 def torque(k):
-    """Γ = L û, with the bias where it is compensated at every joint."""
-    n = k.v.shape[0]
-    for a in range(n):
-        total = 0.0
-        for b in range(a + 1):
-            total += k.L[a, b] * k.u[b]
+    """Γ = U û, with the bias where it is compensated at every joint."""
+    torque_of(k.inertia, k.u, k.tau)
+    for a in range(k.v.shape[0]):
         if k.option[KEEP_TORQUE] != 0.0:
-            total += k.space.start[a]
+            k.tau[a] += k.space.start[a]
         elif k.option[TASK_BIAS] == 0.0:
-            total += k.bias[a]
-        k.tau[a] = total
+            k.tau[a] += k.bias[a]
 
 
 @jit

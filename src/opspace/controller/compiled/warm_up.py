@@ -16,7 +16,7 @@ from opspace.controller.compiled.memory import Sizes, make_tick
 from opspace.controller.compiled.report import spectrum
 from opspace.controller.compiled.tick import tick
 from opspace.law.compiled.handle import Handle
-from opspace.law.compiled.space import space_handle
+from opspace.law.compiled.space import Space
 from opspace.robots.dynamics import ALIGNED, RigidBodies, make_dynamics
 from opspace.robots.motion_axes import MotionAxes
 from opspace.robots.rigid_model import RigidModel
@@ -38,9 +38,18 @@ def compiled_tick() -> float:
 
     def call() -> None:
         tick(0.0, tick_handle(*_smallest(_axes())))
-        spectrum(np.ones((1, 1)), np.zeros(1, np.int64), np.ones((1, 1)), 1, np.zeros(OPTION_SIZE))
+        spectrum(np.ones((1, 1)), np.zeros(OPTION_SIZE))
 
     return _announced("the control tick", tick, call)
+
+
+def tick_entry() -> Callable[[float, Handle], int]:
+    """Return the compiled tick, to be called with the types that it was compiled for.
+
+    Numba looks at the types of all arguments first, which takes as long as a tenth of a tick.
+    """
+    (compiled,) = tick.overloads.values()
+    return compiled.entry_point
 
 
 def compiled_batch() -> float:
@@ -124,8 +133,10 @@ def _one_body() -> RigidBodies:
     )
 
 
-def _smallest(axes: MotionAxes) -> tuple[Tick, Handle, MotionAxes]:
+def _smallest(axes: MotionAxes) -> tuple[Tick, Space, MotionAxes]:
     """Make the arrays of a tick for one joint and no task."""
-    size = Sizes(n=1, tasks=0, rows=0, slots=0, levels=0, variables=0, limits=0, corners=1)
+    size = Sizes(
+        n=1, tasks=0, rows=0, slot_rows=0, slots=0, levels=0, variables=0, limits=0, corners=1
+    )
     memory, space, _ = make_tick(size, axes, np.ones(1), np.zeros(OPTION_SIZE))
-    return memory, space_handle(space), axes
+    return memory, space, axes

@@ -57,17 +57,6 @@ def solve_lower_transposed(L, n, x):
 
 
 @jit
-def gram(B, m, r, G):
-    """Fill the lower triangle of G = B Bᵀ for the rows of B (m, r)."""
-    for i in range(m):
-        for j in range(i + 1):
-            s = 0.0
-            for a in range(r):
-                s += B[i, a] * B[j, a]
-            G[i, j] = s
-
-
-@jit
 def householder(B, m, r, scale, R):
     """Factor Bᵀ = Q R for the rows of B (m <= r): each row becomes a reflector, R (m, m) upper.
 

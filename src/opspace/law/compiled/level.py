@@ -8,7 +8,6 @@ from opspace.law.compiled.algebra import (
     apply_reflectors,
     apply_reflectors_transposed,
     cholesky,
-    gram,
     householder,
     singular_values,
     solve_upper,
@@ -23,8 +22,39 @@ REGULAR = 1e-6
 
 
 @jit
-def solve_level(d, count, n, J, f, last, buffer, s):
-    """Solve the rows ``s.rows[:count]`` below what depth ``d`` has decided.
+def project(d, count, n, J, f, s):
+    """Put the rows ``s.rows[:count]`` before depth ``d``: B = Ĵ Z and the residual f − Ĵ û.
+
+    Args:
+        d: Depth of the levels above in the arrays of ``s``.
+        count: Number of rows m.
+        n: Number of joints.
+        J: Whitened rows of every task set.
+        f: Their desired values.
+        s: The memory.
+    """
+    Z, u, B, rows, residual = s.Z[d], s.u[d], s.B, s.rows, s.residual
+    r = s.free[d]
+    for i in range(count):
+        row, into = J[rows[i]], B[i]
+        done = 0.0
+        for a in range(n):
+            done += row[a] * u[a]
+        residual[i] = f[rows[i]] - done
+        if r == n:  # nothing is used yet, and Z is the identity
+            for b in range(n):
+                into[b] = row[b]
+            continue
+        for b in range(r):
+            x = 0.0
+            for a in range(n):
+                x += row[a] * Z[b, a]
+            into[b] = x
+
+
+@jit
+def solve_level(d, count, n, J, last, buffer, s):
+    """Solve the rows that `project` has put before what depth ``d`` has decided.
 
     û_l = û_{l−1} + (Ĵ_l N_{l−1})⁺ (f_l − Ĵ_l û_{l−1}), for every alternative i: the i strongest
     directions of JN JNᵀ = U Σ Uᵀ (Eq. 25), with weight h(σ_i) − h(σ_{i+1}).
@@ -34,7 +64,6 @@ def solve_level(d, count, n, J, f, last, buffer, s):
         count: Number of rows m.
         n: Number of joints.
         J: Whitened rows of every task set.
-        f: Their desired values.
         last: Whether nothing is below, so that what is left free does not matter.
         buffer: (on, lower, upper, profile); without ``on`` only exact dependence is removed.
         s: The memory.
@@ -43,39 +72,55 @@ def solve_level(d, count, n, J, f, last, buffer, s):
         Number of alternatives; 1 stands for a result that is already at depth d + 1.
     """
     r = s.free[d]
-    _project(d, count, n, r, J, f, s)
     bound = _bound(count, n, J, buffer, s.rows)
+    used = _use_columns(count, r, s)
     if r < count:
         if _solve_tall(d, count, n, r, bound, s):
             return 1
         _singular_tall(count, r, s)
         rank = r
     else:
-        if _solve_wide(d, count, n, r, last, bound, s):
+        if _solve_wide(d, count, n, used, last, bound, s):
             return 1
         _singular_wide(count, s)
         rank = count
     threshold = 0.0
     if buffer[0] == 0.0:
         threshold = RANK_TOLERANCE * _largest(count, n, J, s)
-    return _alternatives(d, count, n, r, rank, threshold, buffer, s)
+    return _alternatives(d, count, n, used, rank, threshold, buffer, s)
 
 
 @jit
-def _project(d, count, n, r, J, f, s):
-    """B = Ĵ Z and the residual f − Ĵ û."""
-    Z, u, B, rows, residual = s.Z, s.u, s.B, s.rows, s.residual
-    for i in range(count):
-        row = rows[i]
-        done = 0.0
-        for a in range(n):
-            done += J[row, a] * u[d, a]
-        residual[i] = f[row] - done
+def _use_columns(m, r, s):
+    """Leave out the free motions that no row moves, where enough are left: columns of zeros in B.
+
+    Returns:
+        How many are left; ``s.column`` lists them, then the others.
+    """
+    B, column, size = s.B, s.column, s.x
+    for b in range(r):
+        size[b] = 0.0
+    for i in range(m):
         for b in range(r):
-            x = 0.0
-            for a in range(n):
-                x += J[row, a] * Z[d, b, a]
-            B[i, b] = x
+            size[b] += abs(B[i, b])
+    used = 0
+    for b in range(r):
+        if size[b] != 0.0:
+            column[used] = b
+            used += 1
+    if used == r or used < m:
+        for b in range(r):
+            column[b] = b
+        return r
+    for i in range(m):
+        for c in range(used):
+            B[i, c] = B[i, column[c]]
+    others = used
+    for b in range(r):
+        if size[b] == 0.0:
+            column[others] = b
+            others += 1
+    return used
 
 
 @jit
@@ -92,51 +137,71 @@ def _bound(count, n, J, buffer, rows):
 
 
 @jit
-def _solve_wide(d, m, n, r, last, bound, s):
+def _solve_wide(d, m, n, used, last, bound, s):
     """Rows that are all active: x = Q R⁻ᵀ residual; what is left free is the rest of Q."""
-    B, G, R, x, scale, residual = s.B, s.G, s.R, s.x, s.scale, s.residual
-    gram(B, m, r, G)
-    regular = cholesky(G, m, bound, s.Y)
-    householder(B, m, r, scale, R)
-    if not regular:
+    B, R, x, scale, residual = s.B, s.R, s.x, s.scale, s.residual
+    householder(B, m, used, scale, R)
+    if not _regular(R, m, bound, s):
         return False
     for i in range(m):
         x[i] = residual[i]
     solve_upper_transposed(R, m, x)
+    r = s.free[d]
     s.free[d + 1] = r - m
-    if not last and r - m > m:
-        _turn_basis(d, m, n, r, s)
+    if used < r or (not last and r - m > m):
+        _turn_basis(d, m, n, used, r, s)
         return True
     for i in range(m, r):
         x[i] = 0.0
     apply_reflectors(B, m, r, scale, x)
-    _step(d, n, r, s.Z[d], x, s.u)
+    _step(n, r, s.Z[d], x, s.u[d], s.u[d + 1])
     if not last:
         for j in range(m, r):
-            _complement(m, n, r, j, B, scale, x, s.Z[d], s.Z[d + 1, j - m])
+            _complement(d, m, n, r, j, x, s, s.Z[d + 1, j - m])
     return True
 
 
 @jit
-def _turn_basis(d, m, n, r, s):
-    """Step along the first m vectors of the basis turned by Qᵀ; the others are what is left free.
-
-    The same as column by column, and cheaper where many columns are left.
-    """
-    turned, Z = s.V[d], s.Z[d + 1]
-    _turn(m, n, r, s.B, s.scale, s.Z[d], turned, s.y)
-    _step(d, n, m, turned, s.x, s.u)
-    for j in range(m, r):
-        for a in range(n):
-            Z[j - m, a] = turned[j, a]
+def _regular(R, m, bound, s):
+    """Whether all eigenvalues of RᵀR are above a bound."""
+    G = s.G
+    for i in range(m):
+        for j in range(i + 1):
+            G[i, j] = 0.0
+    for k in range(m):
+        for i in range(k, m):
+            factor = R[k, i]
+            for j in range(k, i + 1):
+                G[i, j] += factor * R[k, j]
+    return cholesky(G, m, bound, s.Y)
 
 
 @jit
-def _turn(m, n, r, B, scale, Z, turned, w):
-    """Qᵀ Z: the basis turned so that its first m vectors are those that the rows use."""
-    for b in range(r):
-        for a in range(n):
-            turned[b, a] = Z[b, a]
+def _turn_basis(d, m, n, used, r, s):
+    """Step along the first m vectors of the basis turned by Qᵀ; the others are what is left free.
+
+    The same as column by column, and cheaper where many are left.
+    """
+    turned, column, Z, left = s.V[d], s.column, s.Z[d], s.Z[d + 1]
+    for c in range(used):
+        _copy(n, Z[column[c]], turned[c])
+    _turn(m, n, used, s.B, s.scale, turned, s.y)
+    _step(n, m, turned, s.x, s.u[d], s.u[d + 1])
+    for c in range(m, used):
+        _copy(n, turned[c], left[c - m])
+    for c in range(used, r):
+        _copy(n, Z[column[c]], left[c - m])
+
+
+@jit
+def _copy(n, x, into):
+    for a in range(n):
+        into[a] = x[a]
+
+
+@jit
+def _turn(m, n, r, B, scale, turned, w):
+    """Turn a basis so that its first m vectors are those that the rows use."""
     for k in range(m):
         for a in range(n):
             w[a] = 0.0
@@ -153,47 +218,52 @@ def _turn(m, n, r, B, scale, Z, turned, w):
 @jit
 def _solve_tall(d, m, n, r, bound, s):
     """More rows than free motions, all of them used: least squares, nothing is left free."""
-    B, C, G, R, x, scale, residual = s.B, s.C, s.G, s.R, s.x, s.scale, s.residual
+    B, C, R, x, scale, residual = s.B, s.C, s.R, s.x, s.scale, s.residual
     for b in range(r):
         for i in range(m):
             C[b, i] = B[i, b]
-    gram(C, r, m, G)
-    if not cholesky(G, r, bound, s.Y):
-        return False
     householder(C, r, m, scale, R)
+    if not _regular(R, r, bound, s):
+        return False
     for i in range(m):
         x[i] = residual[i]
     apply_reflectors_transposed(C, r, m, scale, x)
     solve_upper(R, r, x)
-    _step(d, n, r, s.Z[d], x, s.u)
+    _step(n, r, s.Z[d], x, s.u[d], s.u[d + 1])
     s.free[d + 1] = 0
     return True
 
 
 @jit
-def _step(d, n, count, vectors, x, u):
+def _step(n, count, vectors, x, before, after):
     """û_l = û_{l−1} + Σ x_b vectors_b."""
     for a in range(n):
-        u[d + 1, a] = u[d, a]
+        after[a] = before[a]
     for b in range(count):
         factor = x[b]
         for a in range(n):
-            u[d + 1, a] += factor * vectors[b, a]
+            after[a] += factor * vectors[b, a]
 
 
 @jit
-def _complement(m, n, r, j, B, scale, x, Z, vector):
+def _complement(d, m, n, used, j, x, s, vector):
     """Column j of Q, in joint coordinates."""
-    for b in range(r):
+    for b in range(used):
         x[b] = 0.0
     x[j] = 1.0
-    apply_reflectors(B, m, r, scale, x)
+    apply_reflectors(s.B, m, used, s.scale, x)
+    _combine(n, used, s.Z[d], s.column, x, vector)
+
+
+@jit
+def _combine(n, used, Z, column, x, vector):
+    """Σ x_c times the vectors of Z that are used."""
     for a in range(n):
         vector[a] = 0.0
-    for b in range(r):
-        factor = x[b]
+    for c in range(used):
+        factor, basis = x[c], Z[column[c]]
         for a in range(n):
-            vector[a] += factor * Z[b, a]
+            vector[a] += factor * basis[a]
 
 
 @jit
@@ -245,9 +315,9 @@ def _largest(count, n, J, s):
 
 
 @jit
-def _alternatives(d, m, n, r, rank, threshold, buffer, s):
+def _alternatives(d, m, n, used, rank, threshold, buffer, s):
     """Directions, what each adds, and the weights of the chain; the i strongest are alternative i."""
-    _directions(d, m, n, r, rank, s)
+    _directions(d, m, n, used, rank, s)
     sigma, strength, share, C, residual = s.sigma, s.strength, s.share, s.C, s.residual
     before = 1.0
     faded = 0
@@ -273,36 +343,34 @@ def _alternatives(d, m, n, r, rank, threshold, buffer, s):
 
 
 @jit
-def _directions(d, m, n, r, rank, s):
+def _directions(d, m, n, used, rank, s):
     """V: right singular vectors in joint coordinates, then an orthonormal basis of the rest."""
-    B, Y, Z, V, x, scale = s.B, s.Y, s.Z, s.V, s.x, s.scale
-    wide = m <= r
+    B, Y, Z, V, x, scale, column = s.B, s.Y, s.Z[d], s.V[d], s.x, s.scale, s.column
+    r = s.free[d]
     for i in range(rank):
-        for b in range(r):
+        for b in range(used):
             x[b] = Y[i, b] if b < rank else 0.0
-        if wide:
-            apply_reflectors(B, m, r, scale, x)
-        for a in range(n):
-            V[d, i, a] = 0.0
-        for b in range(r):
-            factor = x[b]
-            for a in range(n):
-                V[d, i, a] += factor * Z[d, b, a]
-    for j in range(rank, r):
-        _complement(m, n, r, j, B, scale, x, Z[d], V[d, j])
+        if m <= r:
+            apply_reflectors(B, m, used, scale, x)
+        _combine(n, used, Z, column, x, V[i])
+    for j in range(rank, used):
+        _complement(d, m, n, used, j, x, s, V[j])
+    for j in range(used, r):
+        _copy(n, Z[column[j]], V[j])
 
 
 @jit
 def take_alternative(d, i, n, s):
     """Put the alternative with the ``i`` strongest directions at depth d + 1."""
-    u, V, Z, strength = s.u, s.V, s.Z, s.strength
+    V, strength, before, after, left = s.V[d], s.strength[d], s.u[d], s.u[d + 1], s.Z[d + 1]
+    r = s.free[d]
+    s.free[d + 1] = r - i
+    if i == 0:
+        V = s.Z[d]  # as it was, so that the identity stays one
     for a in range(n):
-        total = u[d, a]
+        total = before[a]
         for k in range(i):
-            total += strength[d, k] * V[d, k, a]
-        u[d + 1, a] = total
-    left = s.free[d] - i
-    s.free[d + 1] = left
-    for k in range(left):
-        for a in range(n):
-            Z[d + 1, k, a] = V[d, i + k, a]
+            total += strength[k] * V[k, a]
+        after[a] = total
+    for k in range(i, r):
+        _copy(n, V[k], left[k - i])

@@ -9,6 +9,7 @@ import numpy as np
 
 from opspace.law.compiled.algebra import cholesky, solve_lower, solve_lower_transposed
 from opspace.law.compiled.handle import Handle
+from opspace.law.compiled.inertia import acceleration_of, unit_row, whitened_of
 from opspace.law.compiled.jit import jit
 from opspace.law.nearest import HARD, SOFT, UNBOUNDED
 
@@ -24,7 +25,7 @@ class Bounds(NamedTuple):
         upper: (n,) largest accelerations, inf where there is none.
         least: (n,) least torques beside the bias, N·m.
         most: (n,) largest torques beside the bias, N·m.
-        normal: (4n, n) every bound as unit normal · x <= bound, in x = Lᵀ q̈.
+        normal: (4n, n) every bound as unit normal · x <= bound, in x = Uᵀ q̈.
         bound: (4n,) the bounds.
         softness: (4n,) their softness.
         multiplier: (4n,) multipliers of the bounds.
@@ -85,30 +86,27 @@ def bounds_handle(bounds: Bounds) -> Handle:
 
 
 @jit
-def nearest_acceleration(L, acceleration, s):
+def nearest_acceleration(f, acceleration, s):
     """Overwrite an acceleration with the nearest one within bounds.
 
     The multipliers of the bounds are found by the active-set method of Lawson and Hanson.
 
     Args:
-        L: (n, n) Cholesky factor of the inertia.
+        f: Handle of the inertia's factor.
         acceleration: (n,) rad/s².
         s: Handle of `Bounds`.
     """
     n = acceleration.shape[0]
-    count = _normals(L, n, s)
-    for a in range(n):
-        s.x[a] = 0.0
-        for b in range(a, n):
-            s.x[a] += L[b, a] * acceleration[b]
+    count = _normals(f, n, s)
+    whitened_of(f, acceleration, s.x)
     _project(count, n, s)
     for a in range(n):
         acceleration[a] = s.y[a]
-    solve_lower_transposed(L, n, acceleration)
+    acceleration_of(f, acceleration)
 
 
 @jit
-def _normals(L, n, s):
+def _normals(f, n, s):
     """Write every bound that is finite as unit normal · x <= bound, with its softness.
 
     Returns:
@@ -116,12 +114,10 @@ def _normals(L, n, s):
     """
     count = 0
     for j in range(n):
-        for a in range(n):
-            s.row[a] = 1.0 if a == j else 0.0
-        solve_lower(L, n, s.row)
+        unit_row(f, j, 1.0, s.row)
         count = _two_sided(count, n, s.lower[j], s.upper[j], SOFT, s)
         for a in range(n):
-            s.row[a] = L[j, a] if a <= j else 0.0
+            s.row[a] = f.U[j, a]
         count = _two_sided(count, n, s.least[j], s.most[j], HARD, s)
     return count
 

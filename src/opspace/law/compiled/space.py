@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from opspace.law.compiled.handle import Handle
+from opspace.law.compiled.inertia import inertia_handle, make_inertia
 
 
 class Space(NamedTuple):
@@ -15,7 +16,7 @@ class Space(NamedTuple):
     The first axis of the arrays in the first group is the depth: what the levels above have decided.
 
     Attributes:
-        Z: (D + 1, n, n) basis of the motions still free, vectors as rows.
+        Z: (D + 1, n, n) basis of the motions still free, vectors as rows; the identity while all are.
         u: (D + 1, n) whitened torque so far.
         free: (D + 1,) number of motions still free.
         V: (D + 1, n, n) directions of a level that branches, strongest first, then what it leaves.
@@ -32,6 +33,7 @@ class Space(NamedTuple):
         faded: (1,) whether a direction of the level solved last is faded.
         B: (R, n) rows of a level in the basis of the free motions.
         C: (n, R) their columns, when there are more rows than columns.
+        column: (n,) free motions that the rows move, then the others.
         residual: (R,) what the levels above leave to be done.
         rows: (R,) the rows of a level that are present.
         G: (n, n) scratch.
@@ -41,9 +43,10 @@ class Space(NamedTuple):
         y: (R,) scratch.
         scale: (n,) scratch.
         sigma: (n,) singular values.
-        basis: (D + 1, n, n) Z above each level when ``top`` was found.
+        kept: (rows, n) B of each level when ``top`` was found, from row ``first_kept`` of it on.
+        first_kept: (D + 1,) where that begins for each level.
         motors: (1,) whether torque limits are kept.
-        factor: (n, n) Cholesky factor of the inertia.
+        inertia: Handle of the inertia's factor.
         start: (n,) torque before the first level, inside the limits, N·m.
         limit: (n,) largest torque of each joint, N·m.
         torque: (D + 1, n) torque so far, N·m.
@@ -67,6 +70,7 @@ class Space(NamedTuple):
     faded: np.ndarray
     B: np.ndarray
     C: np.ndarray
+    column: np.ndarray
     residual: np.ndarray
     rows: np.ndarray
     G: np.ndarray
@@ -76,9 +80,10 @@ class Space(NamedTuple):
     y: np.ndarray
     scale: np.ndarray
     sigma: np.ndarray
-    basis: np.ndarray
+    kept: np.ndarray
+    first_kept: np.ndarray
     motors: np.ndarray
-    factor: np.ndarray
+    inertia: Handle
     start: np.ndarray
     limit: np.ndarray
     torque: np.ndarray
@@ -107,6 +112,7 @@ def make_space(n: int, depth: int, rows: int) -> Space:
         faded=np.zeros(1, integers),
         B=np.zeros((most, n)),
         C=np.zeros((n, most)),
+        column=np.zeros(n, integers),
         residual=np.zeros(most),
         rows=np.zeros(R, integers),
         G=np.zeros((n, n)),
@@ -116,9 +122,10 @@ def make_space(n: int, depth: int, rows: int) -> Space:
         y=np.zeros(most),
         scale=np.zeros(most),
         sigma=np.zeros(n),
-        basis=np.zeros((D, n, n)),
+        kept=np.zeros((R, n)),
+        first_kept=np.zeros(D, integers),
         motors=np.zeros(1, integers),
-        factor=np.zeros((n, n)),
+        inertia=inertia_handle(make_inertia(np.arange(n) - 1)),
         start=np.zeros(n),
         limit=np.full(n, np.inf),
         torque=np.zeros((D, n)),

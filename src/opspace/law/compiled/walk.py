@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from opspace.law.compiled.inertia import torque_of
 from opspace.law.compiled.jit import jit
-from opspace.law.compiled.level import solve_level, take_alternative
+from opspace.law.compiled.level import project, solve_level, take_alternative
 from opspace.law.compiled.saturation import room_for
 
 # Columns of ``Space.cursor``.
@@ -108,7 +109,7 @@ def _leaf(d, n, weights, rest, s, u):
         for a in range(n):
             x[a] += along * Z[d, k, a]
     if s.motors[0] != 0:
-        torque_of(x, n, s)
+        torque_of(s.inertia, x, s.part)
         scale = room_for(s.part, s.torque[d], s.limit)
         last = s.got.shape[0] - 1
         s.got[last, 0] += share * scale
@@ -147,12 +148,15 @@ def _next_group(d, levels, n, slots, J, f, masks, weights, rest, buffer, s):
         s.alternatives[d] = 1
         return
     last = d + 1 == levels and rest[n] == 0.0
-    found = solve_level(d, count, n, J, f, last, buffer, s)
+    project(d, count, n, J, f, s)
+    heaviest = share > s.top[d]
+    if heaviest:
+        _remember(d, count, share, present, s)
+    found = solve_level(d, count, n, J, last, buffer, s)
     s.alternatives[d] = found
     if found == 1:
         keep_inside(d, n, share, s)
-    if share > s.top[d]:
-        _remember(d, n, share, present, s)
+    if heaviest:
         s.off[d] = 1 if found > 1 and s.faded[0] != 0 else 0
 
 
@@ -182,17 +186,6 @@ def group_weight(d, weights, cursor):
 
 
 @jit
-def torque_of(x, n, s):
-    """Torque L x of a whitened one, into ``s.part``."""
-    L, part = s.factor, s.part
-    for a in range(n):
-        total = 0.0
-        for b in range(a + 1):
-            total += L[a, b] * x[b]
-        part[a] = total
-
-
-@jit
 def keep_inside(d, n, weight, s):
     """Scale what the level at depth ``d`` has just added, so that the motors can give it."""
     if s.motors[0] == 0:
@@ -200,7 +193,7 @@ def keep_inside(d, n, weight, s):
     u, torque, part, x = s.u, s.torque, s.part, s.x
     for a in range(n):
         x[a] = u[d + 1, a] - u[d, a]
-    torque_of(x, n, s)
+    torque_of(s.inertia, x, part)
     scale = room_for(part, torque[d], s.limit)
     s.got[d, 0] += weight * scale
     s.got[d, 1] += weight
@@ -211,12 +204,12 @@ def keep_inside(d, n, weight, s):
 
 
 @jit
-def _remember(d, n, share, present, s):
+def _remember(d, count, share, present, s):
     """Keep what the heaviest branch finds at this level, for its report."""
-    Z, basis = s.Z, s.basis
+    B, kept, first, r = s.B, s.kept, s.first_kept[d], s.free[d]
     s.top[d] = share
     s.chosen[d] = present
-    s.width[d] = s.free[d]
-    for k in range(s.free[d]):
-        for a in range(n):
-            basis[d, k, a] = Z[d, k, a]
+    s.width[d] = r
+    for i in range(count):
+        for b in range(r):
+            kept[first + i, b] = B[i, b]
