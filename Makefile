@@ -5,12 +5,13 @@ BIN := $(VENV)/bin
 INSTALLED := $(VENV)/.installed
 BENCH := .venv-bench
 
-.PHONY: help test lint docs test-slow test-browser reproduce comparison bench constraints clean
+.PHONY: help test lint docs test-package test-slow test-browser reproduce comparison bench constraints clean
 
 help:
 	@echo "make reproduce   the two experiments of the paper: tables and figures in results/"
 	@echo "make test        lint, types, import rules, the documents and the default test suite"
 	@echo "make docs        the documents as a site in results/site, warnings are errors"
+	@echo "make test-package the default suite on the wheel, from the source distribution"
 	@echo "make test-slow   campaigns that take minutes"
 	@echo "make test-browser the viewer in headless Chromium, which must be installed"
 	@echo "make comparison  run other methods on the show-piece; rewrites the tables in the documents"
@@ -37,6 +38,17 @@ docs: $(INSTALLED)
 test: lint docs
 	$(BIN)/python -m pytest -n 2
 
+# What is shipped is what is tested: the wheel made from the source distribution, in an environment of
+# its own, by the tests that the source distribution carries.
+PACKAGE := .venv-package
+test-package: $(INSTALLED)
+	rm -rf $(PACKAGE) results/package
+	$(BIN)/python -m build --installer uv --outdir results/package .
+	$(PYTHON) -m venv $(PACKAGE)
+	$(BIN)/uv pip install --quiet --python $(PACKAGE)/bin/python --constraints constraints.txt "opspace[all,docs,test] @ $$(ls results/package/*.whl)"
+	tar -xzf results/package/*.tar.gz -C results/package
+	cd results/package/opspace-*/ && mv src source && $(CURDIR)/$(PACKAGE)/bin/python -m pytest -n 2
+
 test-slow: $(INSTALLED)
 	$(BIN)/python -m pytest -m slow
 
@@ -62,4 +74,4 @@ constraints: $(INSTALLED)
 	$(BIN)/uv pip compile --quiet --universal --upgrade --python-version 3.10 --extra all --extra docs --extra test --no-header --no-annotate --no-emit-index-url --output-file constraints.txt pyproject.toml
 
 clean:
-	rm -rf $(VENV) $(BENCH) results dist build .pytest_cache .ruff_cache .hypothesis
+	rm -rf $(VENV) $(BENCH) $(PACKAGE) results dist build .pytest_cache .ruff_cache .hypothesis
