@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -52,7 +53,7 @@ class Block:
 
     def take(self, *shape: int) -> np.ndarray:
         """Cut an array of numbers."""
-        size = int(np.prod(shape))
+        size = math.prod(shape)
         part = self.memory[self._used : self._used + size].reshape(shape)
         self._used += size
         return part

@@ -28,11 +28,12 @@ class CompiledReport:
         memory: Copy of the block that the tick wrote.
     """
 
-    __slots__ = ("_levels", "_memory", "_plan", "_tasks")
+    __slots__ = ("_levels", "_memory", "_parts", "_plan", "_tasks")
 
     def __init__(self, plan: Plan, memory: np.ndarray) -> None:
         self._plan = plan
         self._memory = memory
+        self._parts: dict[str, np.ndarray] | None = None
         self._tasks: dict[str, TaskStatus] | None = None
         self._levels: tuple[LevelStatus, ...] | None = None
 
@@ -86,9 +87,11 @@ class CompiledReport:
         )
 
     def _found(self) -> dict[str, np.ndarray]:
-        block = Block(0)
-        block.memory = self._memory
-        return reported(self._plan.size, block)
+        if self._parts is None:
+            block = Block(0)
+            block.memory = self._memory
+            self._parts = reported(self._plan.size, block)
+        return self._parts
 
     def _level(self, found: dict[str, np.ndarray], rank: int, level: float) -> LevelStatus:
         plan = self._plan
