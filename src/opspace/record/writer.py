@@ -90,10 +90,11 @@ class Recorder:
             raise RecordingError(f"{self.directory} cannot be written: {error.strerror}") from error
 
     def append(self, row: ArrayLike) -> None:
-        """Write one row, at once and unbuffered.
+        """Write one row or several, at once and unbuffered.
 
         Args:
-            row: (number of columns,) the values in the order of ``columns``.
+            row: (number of columns,) the values in the order of ``columns``; or (rows, number of
+                columns).
 
         Raises:
             InputError: The row has another length, or holds something other than numbers.
@@ -105,7 +106,7 @@ class Recorder:
             raise InputError(
                 f"a row of {self.directory} is not made of numbers: {error}"
             ) from error
-        if values.shape != (len(self.columns),):
+        if values.ndim not in (1, 2) or values.shape[-1] != len(self.columns):
             raise InputError(
                 f"a row of {self.directory} has shape ({len(self.columns)},), not {values.shape}"
             )

@@ -10,7 +10,7 @@ from opspace.record.format import write_json
 from opspace.record.observer import State, TickRecorder
 from opspace.scenario.build import Built, build
 from opspace.scenario.events import late_tasks, levels_visited
-from opspace.scenario.load import dump_scenario, to_dict
+from opspace.scenario.load import dump_scenario
 from opspace.scenario.metrics import Metrics, measure
 from opspace.scenario.progress import ProgressBar
 from opspace.scenario.references import return_time
@@ -63,11 +63,10 @@ def run_scenario(
         RecordingError: There is a recording already, or the directory cannot be written.
     """
     built = build(scenario)
-    header = {"scenario": to_dict(scenario), "seed": scenario.seed, "dt": scenario.dt}
     recorder = TickRecorder(
         out,
         built.controller,
-        header,
+        built.header,
         tasks=[built.tasks[name] for name in scenario.tasks if name in late_tasks(scenario.events)],
         levels={
             number: [built.tasks[name] for name in names]
