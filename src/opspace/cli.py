@@ -367,7 +367,9 @@ def check(
 def replay(
     recording: Annotated[
         Path,
-        typer.Argument(help="Directory of a recording of opspace run or a black box.", metavar="RUN"),
+        typer.Argument(
+            help="Directory of a recording of opspace run or a black box.", metavar="RUN"
+        ),
     ],
 ) -> None:
     """Put the recorded states to a fresh controller and compare the torques."""

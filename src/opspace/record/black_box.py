@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import threading
 import warnings
-from array import array
-from collections.abc import Mapping
+from collections import deque
+from collections.abc import Mapping, Sequence
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -29,7 +29,10 @@ MOST = 20
 RAISED = "raised"
 FIRST = "first"
 FAILURE = "failure"
-_ALL = ...  # as an index it is quicker than a slice
+
+_both = int.__and__  # that of flags is Python's and slow
+_Tick = tuple[float, bytes, bytes, bytes, int]
+"""t, q, v, τ and status of a tick."""
 
 
 class BlackBox:
@@ -73,12 +76,11 @@ class BlackBox:
             self.directory.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise RecordingError(f"{directory}: cannot be written: {error.strerror}") from error
-        self._controller = controller
+        self._robot, self._tick = controller.robot, controller.step
         self._header = dict(header or {})
         self._on = int(on)
         self._ticks = ticks
-        self._make_rows(controller.robot)
-        self._next = 0
+        self._kept: deque[_Tick] = deque(maxlen=ticks)
         self._seen = 0
         self._first: dict[str, Any] | None = None
         self._last: Command | None = None
@@ -89,25 +91,25 @@ class BlackBox:
     @property
     def robot(self) -> Robot:
         """The controller's robot."""
-        return self._controller.robot
+        return self._robot
 
     def step(self, t: float, q: ArrayLike, v: ArrayLike) -> Command:
         """Compute the torque for one state; see `opspace.Controller.step`."""
         try:
-            command = self._controller.step(t, q, v)
+            command = self._tick(t, q, v)
         except Exception as error:
             self._keep_refused(t, q, v)
             self._failed(RAISED, f"{type(error).__name__}: {error}", None)
             raise
-        i = self._next
-        self._t[i] = t
-        self._q[i][_ALL] = q
-        self._v[i][_ALL] = v
-        self._tau[i][_ALL] = command.tau
-        self._status[i] = command.status
-        self._advance()
-        if self._status[i] & self._on:
-            kind = "|".join(s.name or "" for s in Status if s & command.status & self._on)
+        # Bytes are copied quicker than rows of an array are written; the robot holds the state as
+        # the controller took it.
+        robot, status = self._robot, command.status
+        self._kept.append((t, robot.q.tobytes(), robot.v.tobytes(), command.tau.tobytes(), status))
+        self._seen += 1
+        if self._first is None:
+            self._first = {"t": float(t), "q": robot.q.tolist(), "v": robot.v.tolist()}
+        if _both(status, self._on):
+            kind = "|".join(s.name or "" for s in Status if s & status & self._on)
             self._failed(kind, kind, command)
         self._last = command
         return command
@@ -117,38 +119,14 @@ class BlackBox:
         for thread in self._threads:
             thread.join()
 
-    def _make_rows(self, robot: Robot) -> None:
-        sizes = np.cumsum([robot.nq, robot.nv, robot.nv])
-        self._numbers = np.zeros((self._ticks, sizes[-1]))
-        # A view for each row: finding it by its number would cost more than the copy.
-        q, v, tau, _ = np.split(self._numbers, sizes, axis=1)
-        self._q, self._v, self._tau = list(q), list(v), list(tau)
-        self._t = array("d", bytes(8 * self._ticks))
-        self._status = array("q", bytes(8 * self._ticks))
-
-    def _advance(self) -> None:
-        if self._first is None:
-            i = self._next
-            self._first = {"t": self._t[i], "q": self._q[i].tolist(), "v": self._v[i].tolist()}
-        self._seen += 1
-        self._next = self._seen % self._ticks
-
     def _keep_refused(self, t: float, q: ArrayLike, v: ArrayLike) -> None:
         """Remember a tick that has no torque, as far as it is made of numbers."""
-        i = self._next
-        self._numbers[i] = self._t[i] = np.nan
-        self._status[i] = 0
-        for rows, value in ((self._q, q), (self._v, v)):
-            try:
-                rows[i][:] = np.asarray(value, dtype=float).reshape(rows[i].shape)
-            except (TypeError, ValueError):
-                continue
-        try:
-            self._t[i] = float(t)
-        except (TypeError, ValueError):
-            pass
+        n = self._robot.nv
+        time = _numbers(t, 1)[0]
+        torque = np.full(n, np.nan).tobytes()
+        state = _numbers(q, self._robot.nq).tobytes(), _numbers(v, n).tobytes()
+        self._kept.append((time, *state, torque, 0))
         self._seen += 1
-        self._next = self._seen % self._ticks
 
     def _failed(self, kind: str, reason: str, command: Command | None) -> None:
         """Hand what is remembered to a thread that writes it."""
@@ -159,22 +137,15 @@ class BlackBox:
         path = self.directory / name.replace("|", "-")
         self.written.append(path)
         thread = threading.Thread(
-            target=self._write, args=(path, self._rows(), kind, reason, self._last, command)
+            target=self._write, args=(path, tuple(self._kept), kind, reason, self._last, command)
         )
         self._threads = [t for t in self._threads if t.is_alive()] + [thread]
         thread.start()
 
-    def _rows(self) -> np.ndarray:
-        """Copy what is remembered, the oldest tick first."""
-        count = min(self._seen, self._ticks)
-        order = np.arange(self._seen - count, self._seen) % self._ticks
-        t, status = np.frombuffer(self._t), np.frombuffer(self._status, dtype=np.int64)
-        return np.column_stack([t[order], self._numbers[order], status[order]])
-
     def _write(
         self,
         path: Path,
-        rows: np.ndarray,
+        kept: Sequence[_Tick],
         kind: str,
         reason: str,
         before: Command | None,
@@ -184,16 +155,31 @@ class BlackBox:
         header = {
             **self._header,
             FIRST: self._first,
-            FAILURE: {"kind": kind, "row": len(rows) - 1},
+            FAILURE: {"kind": kind, "row": len(kept) - 1},
             "tasks": _tasks(command if command is not None and command.tasks else before),
         }
         columns = [*state_columns(self.robot), STATUS]
         try:
             with Recorder(path, columns, header) as recorder:
-                recorder.append(rows)
+                recorder.append(_rows(kept))
                 recorder.close(ended, reason)
         except OpspaceError as error:
             warnings.warn(f"the black box could not be written: {error}", stacklevel=1)
+
+
+def _numbers(values: ArrayLike | float, size: int) -> np.ndarray:
+    """Read as many numbers; all of them are NaN where the values are something else."""
+    try:
+        return np.array(values, dtype=float).reshape(size)
+    except (TypeError, ValueError):
+        return np.full(size, np.nan)
+
+
+def _rows(kept: Sequence[_Tick]) -> np.ndarray:
+    """Write ticks as rows of a recording."""
+    t, q, v, tau, status = zip(*kept, strict=True)
+    groups = [np.frombuffer(b"".join(group)).reshape(len(kept), -1) for group in (q, v, tau)]
+    return np.column_stack([t, *groups, status])
 
 
 def _tasks(command: Command | None) -> dict[str, Any]:

@@ -12,7 +12,6 @@ from opspace.errors import OpspaceError, RecordingError
 from opspace.record.black_box import FIRST
 from opspace.record.reader import Recording, load
 
-
 _Row = tuple[float, np.ndarray, np.ndarray, np.ndarray, float]
 
 
@@ -66,20 +65,26 @@ def replay(recording: Path | str | Recording, controller: ReferenceController) -
     rows = _rows(recording, controller)
     found = Replay(len(recording), f"{recording.ended.how} {recording.ended.reason}".strip())
     _begin(recording, controller)
-    for t, q, v, tau, status in rows[:-1]:
+    for t, q, v, tau, _ in rows[:-1]:
         _compare(found, t, controller.step(t, q, v), tau)
-    for t, q, v, tau, status in rows[-1:]:
-        try:
-            command = controller.step(t, q, v)
-        except Exception as error:  # noqa: BLE001 - whatever ended the run
-            found.last = f"{type(error).__name__}: {error}"
-            found.repeated = recording.ended.reason == found.last
-            break
-        _compare(found, t, command, tau)
-        found.last = names(command.status)
-        found.repeated = int(command.status) == status
+    if rows:
+        _last(found, rows[-1], controller)
     _in_seconds(found, recording)
     return found
+
+
+def _last(found: Replay, row: _Row, controller: ReferenceController) -> None:
+    """Replay the last tick, which may have ended the run."""
+    t, q, v, tau, status = row
+    try:
+        command = controller.step(t, q, v)
+    except Exception as error:
+        found.last = f"{type(error).__name__}: {error}"
+        found.repeated = found.ended.endswith(found.last)
+        return
+    _compare(found, t, command, tau)
+    found.last = names(command.status)
+    found.repeated = int(command.status) == status
 
 
 def names(status: Status) -> str:
