@@ -34,8 +34,10 @@ from opspace.robots.dynamics import make_dynamics
 from opspace.robots.motion_axes import MotionAxes
 from opspace.robots.rigid_model import RigidModel
 from opspace.stack import Member
+from opspace.tasks.validation import finite, numbers
 
 STATUSES = tuple(Status(bits) for bits in range(2048))
+FLOAT = np.dtype(float)
 TIME_JUMP, FAULT = int(Status.TIME_JUMP), int(Status.FAULT)
 
 
@@ -63,11 +65,10 @@ class Controller(ReferenceController):
             if axes is None:
                 return super().step(t, q, v)
             compiled_tick()
-        t = float(t)
-        if not math.isfinite(t):
-            raise InputError(f"time must be finite, got {t}")
+        if type(t) is not float or not math.isfinite(t):
+            t = finite(t, "time")
         robot: AdapterBase = self.robot  # pyright: ignore[reportAssignmentType]
-        q, v = _vector(q), _vector(v)
+        q, v = _vector(q, "q"), _vector(v, "v")
         if q.shape != axes.q.shape or v.shape != axes.v.shape:
             robot.check_state(q, v)
         robot.place(q, v)
@@ -225,5 +226,7 @@ class Controller(ReferenceController):
         return option
 
 
-def _vector(value: ArrayLike) -> np.ndarray:
-    return value if type(value) is np.ndarray else np.asarray(value, dtype=float)
+def _vector(value: ArrayLike, name: str) -> np.ndarray:
+    if type(value) is np.ndarray and value.dtype is FLOAT:
+        return value
+    return numbers(value, name)
