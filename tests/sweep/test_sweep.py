@@ -163,6 +163,18 @@ def test_a_process_that_dies_or_hangs_is_replaced(monkeypatch):
     assert found[1]["reason"] == "SIGKILL"
 
 
+def test_the_time_allowed_begins_when_the_process_is_ready(monkeypatch):
+    monkeypatch.setattr(pool, "_serve", _serve_late)
+    (row,) = pool.run_here(SweepPlan(BASE, [GAIN], runs=1), [0], 1, timeout=2.5)
+    assert row["ended"] == "completed"
+
+
+def _serve_late(plan, pipe):
+    time.sleep(4.0)
+    pool.run_row = lambda plan, index: {"index": index, "ended": "completed"}
+    pool._serve(plan, pipe)
+
+
 @pytest.mark.slow
 def test_killed_at_random_moments_a_sweep_loses_and_repeats_nothing(tmp_path):
     out = tmp_path / "s"
