@@ -35,15 +35,20 @@ class Adversary:
         self.controller = osc.Controller(robot, self.stack, torque_limits=motors)
         self.plant = Plant(robot, robot.q_reference, torque_limits=motors == "priority")
         self.t = 0.0
+        self.side = np.ones(robot.nv)
 
     def begin(self, rng):
-        """A state from which every joint can stop at its limits: many near them, many at the edge."""
+        """A state from which every joint can stop at its limits: many near them, many at the edge.
+
+        Most joints begin on their way to the limit that they are near, and are driven there.
+        """
         robot = self.robot
         lower = np.where(np.isfinite(robot.q_lower), robot.q_lower, -3.0)
         upper = np.where(np.isfinite(robot.q_upper), robot.q_upper, 3.0)
         away = np.minimum(rng.exponential(0.1, robot.nv), upper - lower)
-        near = np.where(rng.random(robot.nv) < 0.5, lower + away, upper - away)
-        q = np.where(rng.random(robot.nv) < 0.5, near, rng.uniform(lower, upper))
+        self.side = rng.choice([-1.0, 1.0], robot.nv)
+        near = np.where(self.side < 0.0, lower + away, upper - away)
+        q = np.where(rng.random(robot.nv) < 0.7, near, rng.uniform(lower, upper))
         fastest = np.full((2, robot.nv), 5.0)
         for side in self.limits.sides:
             distance = max(side.sign * (side.limit - q[side.index]), 0.0)
@@ -52,7 +57,8 @@ class Adversary:
                 allowed = self.limits.allowed_speed(side, distance)
             row = fastest[int(side.sign > 0.0)]
             row[side.index] = min(allowed, side.speed, row[side.index])
-        v = np.where(rng.random(robot.nv) < 0.5, -fastest[0], fastest[1])
+        there = self.side * rng.choice([-1.0, 1.0, 1.0, 1.0], robot.nv)
+        v = np.where(there < 0.0, -fastest[0], fastest[1])
         self.plant.data.qpos[:] = q
         self.plant.data.qvel[:] = v * rng.choice([0.0, 0.5, 1.0, 1.0], robot.nv)
         for task in (self.tool, self.turn, self.posture):
@@ -63,7 +69,9 @@ class Adversary:
         self.tool.target = 3.0 * rng.normal(size=3)
         quaternion = rng.normal(size=4)
         self.turn.target = quaternion / np.linalg.norm(quaternion)
-        self.posture.target = rng.uniform(-8.0, 8.0, self.robot.nv)
+        beyond = self.plant.q + self.side * rng.uniform(0.0, 8.0, self.robot.nv)
+        anywhere = rng.uniform(-8.0, 8.0, self.robot.nv)
+        self.posture.target = np.where(rng.random(self.robot.nv) < 0.8, beyond, anywhere)
         if rng.random() < 0.5:
             first, second = rng.permutation([self.tool, self.turn, self.posture])[:2]
             self.stack.swap(first, second, duration=float(rng.choice([0.0, 0.03, 0.2])))
