@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-import threading
+import time
 import warnings
 from collections import deque
 from collections.abc import Mapping, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -25,6 +26,9 @@ FAILURES = Status.FAULT | Status.LIMIT_LOST
 
 MOST = 20
 """A box writes no more recordings than this: a loop that goes on failing must not fill the disk."""
+
+PAUSE = 0.05
+"""The thread that writes lets the loop go on for so long before it begins, s."""
 
 RAISED = "raised"
 FIRST = "first"
@@ -85,7 +89,9 @@ class BlackBox:
         self._first: dict[str, Any] | None = None
         self._last: Command | None = None
         self._quiet_until: dict[str, int] = {}
-        self._threads: list[threading.Thread] = []
+        # Started here: to wait for a new thread in the tick that fails would cost the most of it.
+        self._writer = ThreadPoolExecutor(1, thread_name_prefix="black box")
+        self._writing: list[Future[None]] = [self._writer.submit(time.sleep, 0.0)]
         self.written: list[Path] = []
 
     @property
@@ -116,16 +122,16 @@ class BlackBox:
 
     def wait(self) -> None:
         """Wait until what has failed so far is on the disk."""
-        for thread in self._threads:
-            thread.join()
+        for writing in self._writing:
+            writing.result()
 
     def _keep_refused(self, t: float, q: ArrayLike, v: ArrayLike) -> None:
         """Remember a tick that has no torque, as far as it is made of numbers."""
         n = self._robot.nv
-        time = _numbers(t, 1)[0]
+        when = _numbers(t, 1)[0]
         torque = np.full(n, np.nan).tobytes()
         state = _numbers(q, self._robot.nq).tobytes(), _numbers(v, n).tobytes()
-        self._kept.append((time, *state, torque, 0))
+        self._kept.append((when, *state, torque, 0))
         self._seen += 1
 
     def _failed(self, kind: str, reason: str, command: Command | None) -> None:
@@ -136,11 +142,8 @@ class BlackBox:
         name = f"{datetime.now():%Y%m%d-%H%M%S}-{len(self.written)}-{kind.lower()}"
         path = self.directory / name.replace("|", "-")
         self.written.append(path)
-        thread = threading.Thread(
-            target=self._write, args=(path, tuple(self._kept), kind, reason, self._last, command)
-        )
-        self._threads = [t for t in self._threads if t.is_alive()] + [thread]
-        thread.start()
+        work = self._write, path, tuple(self._kept), kind, reason, self._last, command
+        self._writing.append(self._writer.submit(*work))
 
     def _write(
         self,
@@ -151,6 +154,7 @@ class BlackBox:
         before: Command | None,
         command: Command | None,
     ) -> None:
+        time.sleep(PAUSE)
         ended: Ended = "crashed" if kind == RAISED else "stopped"
         header = {
             **self._header,

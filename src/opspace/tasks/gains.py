@@ -54,7 +54,7 @@ class Gains:
         asked = speed_per_error(self.kp, self.kv) * error
         limited = error.copy()
         for rows, limit in zip(self.groups, max_speed, strict=True):
-            speed = math.sqrt(asked[rows] @ asked[rows])
+            speed = math.hypot(*asked[rows])
             if speed > limit:
                 limited[rows] *= limit / speed
         return limited
