@@ -165,7 +165,7 @@ class BlackBox:
         columns = [*state_columns(self.robot), STATUS]
         try:
             with Recorder(path, columns, header) as recorder:
-                recorder.append(_rows(kept))
+                recorder.extend(_rows(kept))
                 recorder.close(ended, reason)
         except OpspaceError as error:
             warnings.warn(f"the black box could not be written: {error}", stacklevel=1)

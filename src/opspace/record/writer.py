@@ -90,11 +90,10 @@ class Recorder:
             raise RecordingError(f"{self.directory} cannot be written: {error.strerror}") from error
 
     def append(self, row: ArrayLike) -> None:
-        """Write one row or several, at once and unbuffered.
+        """Write one row, at once and unbuffered.
 
         Args:
-            row: (number of columns,) the values in the order of ``columns``; or (rows, number of
-                columns).
+            row: (number of columns,) the values in the order of ``columns``.
 
         Raises:
             InputError: The row has another length, or holds something other than numbers.
@@ -106,10 +105,29 @@ class Recorder:
             raise InputError(
                 f"a row of {self.directory} is not made of numbers: {error}"
             ) from error
-        if values.ndim not in (1, 2) or values.shape[-1] != len(self.columns):
+        if values.shape != (len(self.columns),):
             raise InputError(
                 f"a row of {self.directory} has shape ({len(self.columns)},), not {values.shape}"
             )
+        self._write(values)
+
+    def extend(self, rows: np.ndarray) -> None:
+        """Write several rows at once.
+
+        Args:
+            rows: (rows, number of columns) as for `append`.
+
+        Raises:
+            InputError: The rows have another length.
+            RecordingError: The recorder is closed, or the file cannot be written.
+        """
+        if rows.ndim != 2 or rows.shape[1] != len(self.columns):
+            raise InputError(
+                f"rows of {self.directory} have shape (rows, {len(self.columns)}), not {rows.shape}"
+            )
+        self._write(rows.astype(fmt.DTYPE))
+
+    def _write(self, values: np.ndarray) -> None:
         if self._descriptor is None:
             raise RecordingError(f"{self.directory}: the recording is already closed")
         rest = memoryview(values.tobytes())
