@@ -35,7 +35,10 @@ if TYPE_CHECKING:
     from opspace.record import Recorder as Recorder
     from opspace.record import Recording as Recording
     from opspace.record import load as load
+    from opspace.record.black_box import BlackBox as BlackBox
     from opspace.record.observer import TickRecorder as TickRecorder
+    from opspace.record.replay import Replay as Replay
+    from opspace.record.replay import replay as replay
     from opspace.robots import Robot as Robot
     from opspace.robots import RobotInfo as RobotInfo
     from opspace.robots import available_robots as available_robots
@@ -88,7 +91,9 @@ _NAMES = {
         "Activation Buffer LawInfo Profile Ramp SigmaBuffer TaskSet intermediate_values task_torque"
     ),
     "opspace.record": "Column Recorder Recording load",
+    "opspace.record.black_box": "BlackBox",
     "opspace.record.observer": "TickRecorder",
+    "opspace.record.replay": "Replay replay",
     "opspace.robots": "Robot RobotInfo available_robots load_robot",
     "opspace.sim": "Observer Outcome Plant StopRule simulate",
     "opspace.stack": "Stack",

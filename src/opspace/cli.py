@@ -456,7 +456,10 @@ def _stay(result: RunResult) -> None:
 @app.command(epilog="Example: opspace replay results/showpiece")
 def replay(
     recording: Annotated[
-        Path, typer.Argument(help="Directory of a recording of opspace run.", metavar="RUN")
+        Path,
+        typer.Argument(
+            help="Directory of a recording of opspace run or a black box.", metavar="RUN"
+        ),
     ],
 ) -> None:
     """Put the recorded states to a fresh controller and compare the torques."""
@@ -465,6 +468,7 @@ def replay(
     found = replay(recording)
     print(f"{found.ticks} ticks; how the recorded run ended: {found.ended}")
     print(f"largest difference of a torque: {found.gap:.3g} N·m at t = {found.gap_at:.3f} s")
+    print(f"last tick: {found.last}{', as recorded' if found.repeated else ', NOT as recorded'}")
     if found.seconds:
         rows = [
             (name, f"{seconds:.3f}", f"{found.first[name]:.3f}")

@@ -10,10 +10,10 @@ from opspace.law.saturation import SHARE, room_for
 SEEDS = st.integers(0, 2**32 - 1)
 
 
-def random_case(seed, levels=3):
+def random_case(seed, levels=3, fewest=2):
     """An arm, task sets on levels of their own, and motors that give a part of what they ask for."""
     rng = np.random.default_rng(seed)
-    n = int(rng.integers(2, 8))
+    n = int(rng.integers(fewest, 8))
     A = rng.normal(size=(n, n))
     M = A @ A.T + 0.3 * np.eye(n)
     tasks = [
@@ -62,24 +62,49 @@ def test_no_level_gives_way_to_one_below(seed):
         np.testing.assert_allclose(above, scale[:count], rtol=1e-9)
 
 
+def free(L, tasks):
+    """The torque of the tasks on motors that give anything."""
+    blend = corners([task.activation for task in tasks], "idv")
+    return blended_torque(L, tasks, blend)[0]
+
+
 @given(SEEDS)
-def test_levels_below_know_what_a_scaled_level_does(seed):
-    """The second level gets what it asks for, whatever the first one was left of its own."""
-    L, tasks, motors = random_case(seed, levels=2)
+def test_every_level_is_that_of_the_law_above_what_was_left_of_the_others(seed):
+    """Γ = Γ₀ + s₁ γ₁ + s₂ γ₂, with γ₂ for a first level that asks for s₁ f₁ from the beginning."""
+    L, tasks, motors = random_case(seed, levels=2, fewest=3)
+    first, second = (task.replace(activation=1.0) for task in tasks)
+    tau, (s1, s2) = limited(L, [first, second], motors)
+    gamma1 = free(L, [first])
+    gamma2 = free(L, [first.replace(f=s1 * first.f), second]) - s1 * gamma1
+    scale = 1.0 + np.abs(gamma1).max() + np.abs(gamma2).max()
+    np.testing.assert_allclose(
+        tau, motors.start + s1 * gamma1 + s2 * gamma2, rtol=0.0, atol=1e-9 * scale
+    )
+    assert np.isclose(s1, room_for(gamma1, motors.start, motors.limit), rtol=1e-9)
+    assert np.isclose(s2, room_for(gamma2, motors.start + s1 * gamma1, motors.limit), rtol=1e-6)
+
+
+@given(SEEDS, st.floats(0.05, 0.9))
+def test_a_level_can_be_exact_below_one_that_is_scaled(seed, part):
+    """One motor stops the first level; the second one hardly needs it and gets all it asks for."""
+    L, tasks, _ = random_case(seed, levels=2, fewest=4)
     n = len(L)
-    if n < 4:
-        return
-    tasks = [task.replace(activation=1.0) for task in tasks]
-    # Motors that stop the first level and have plenty for the second one.
-    first, _ = limited(L, tasks[:1], motors._replace(start=np.zeros(n)))
-    tau, scale = limited(L, tasks, motors._replace(start=np.zeros(n)))
-    if scale[0] < 1.0 and scale[1] == 1.0:
-        M = L @ L.T
-        got = tasks[1].J @ np.linalg.solve(M, tau)
-        np.testing.assert_allclose(got, tasks[1].f, rtol=1e-6, atol=1e-6)
-        np.testing.assert_allclose(
-            tasks[0].J @ np.linalg.solve(M, tau - first), 0.0, atol=1e-7 * np.abs(tau).max()
-        )
+    M = L @ L.T
+    first, second = (task.replace(activation=1.0) for task in tasks)
+    gamma1 = free(L, [first])
+    used = int(np.argmax(np.abs(gamma1)))
+    limit = np.full(n, 1e6)
+    limit[used] = part * np.abs(gamma1[used]) / SHARE
+    wish = second.f / np.linalg.norm(second.f)
+    unit = free(L, [first.replace(f=0.0 * first.f), second.replace(f=wish)])
+    size = 0.5 * SHARE * (1.0 - SHARE) * limit[used] / max(abs(unit[used]), 1e-3)
+    did = second.J @ np.linalg.solve(M, part * gamma1)
+    second = second.replace(f=did + size * wish)
+    tau, scale = limited(L, [first, second], Motors(L, np.zeros(n), limit))
+    np.testing.assert_allclose(scale, [part, 1.0], rtol=1e-9)
+    for task, f in ((first, part * first.f), (second, second.f)):
+        got = task.J @ np.linalg.solve(M, tau)
+        np.testing.assert_allclose(got, f, rtol=0.0, atol=1e-6 * (1.0 + np.abs(f).max()))
 
 
 @given(SEEDS)

@@ -163,35 +163,54 @@ def test_a_process_that_dies_or_hangs_is_replaced(monkeypatch):
     assert found[1]["reason"] == "SIGKILL"
 
 
+def test_the_time_allowed_begins_when_the_process_is_ready(monkeypatch):
+    monkeypatch.setattr(pool, "_serve", _serve_late)
+    (row,) = pool.run_here(SweepPlan(BASE, [GAIN], runs=1), [0], 1, timeout=2.5)
+    assert row["ended"] == "completed"
+
+
+def _serve_late(plan, pipe):
+    time.sleep(4.0)
+    pool.run_row = lambda plan, index: {"index": index, "ended": "completed"}
+    pool._serve(plan, pipe)
+
+
 @pytest.mark.slow
 def test_killed_at_random_moments_a_sweep_loses_and_repeats_nothing(tmp_path):
     out = tmp_path / "s"
     command = [
         sys.executable, "-c", "from opspace.cli import main; main()",
-        "sweep", "random", "--runs", "60", "--seed", "3", "--jobs", "2", "--out", str(out),
+        "sweep", "random", "--runs", "80", "--seed", "3", "--jobs", "2", "--out", str(out),
     ]  # fmt: skip
     seen: dict[str, tuple[int, bytes]] = {}
     moments = random.Random(0)
+
+    def rows():
+        return sorted((out / "rows").glob("[0-9]*.json"))
+
     for _ in range(20):
+        before = len(rows())
         process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-        try:
-            process.wait(moments.uniform(1.5, 7.0))
-        except subprocess.TimeoutExpired:
-            process.kill()
-            process.wait()
-        for path in (out / "rows").glob("[0-9]*.json"):
+        # Always in the middle of the work, however slow the machine is to begin.
+        while process.poll() is None and len(rows()) == before:
+            time.sleep(0.01)
+        time.sleep(moments.uniform(0.0, 0.3))
+        assert process.poll() is None, "the sweep was over before it could be killed 20 times"
+        process.kill()
+        process.wait()
+        for path in rows():
             now = (path.stat().st_mtime_ns, path.read_bytes())
             assert seen.setdefault(path.name, now) == now
-        assert set(seen) <= {path.name for path in (out / "rows").iterdir()}
+        assert set(seen) == {path.name for path in rows()}
     subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
     for name, (when, content) in seen.items():
         path = out / "rows" / name
         assert (path.stat().st_mtime_ns, path.read_bytes()) == (when, content)
-    rows = [json.loads(path.read_text()) for path in sorted((out / "rows").glob("[0-9]*.json"))]
-    assert [row["index"] for row in rows] == list(range(60))
-    plan = SweepPlan(None, [], 60, 3)
-    for index in (0, 17, 59):
-        assert rows[index] == json.loads(json.dumps(run_row(plan, index)))
+    found = [json.loads(path.read_text()) for path in rows()]
+    assert [row["index"] for row in found] == list(range(80))
+    plan = SweepPlan(None, [], 80, 3)
+    for index in (0, 17, 79):
+        assert found[index] == json.loads(json.dumps(run_row(plan, index)))
 
 
 @pytest.mark.slow

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from opspace.controller.compiled.batch import Remembered, ticks
 from opspace.controller.compiled.layout import OWN, REMEMBERS, TURN
-from opspace.controller.compiled.packing import kind_of, own_activation
+from opspace.controller.compiled.packing import kind_of
 from opspace.controller.compiled.plan import Plan
 from opspace.errors import InputError
 from opspace.law.compiled.handle import Handle
@@ -21,6 +21,7 @@ from opspace.robots.dynamics import make_dynamics
 from opspace.robots.motion_axes import MotionAxes
 from opspace.robots.rigid_model import RigidModel
 from opspace.stack import Member
+from opspace.tasks.activations import own_activation
 from opspace.tasks.tracking import TrackingTask
 
 CHUNK = 64

@@ -35,6 +35,7 @@ from opspace.robots.dynamics import make_dynamics
 from opspace.robots.motion_axes import MotionAxes
 from opspace.robots.rigid_model import RigidModel
 from opspace.stack import Member
+from opspace.tasks.validation import finite, numbers
 
 STATUSES = tuple(Status(bits) for bits in range(2048))
 NEW = tuple.__new__
@@ -66,11 +67,15 @@ class Controller(ReferenceController):
             axes = self._axes
             if axes is None:
                 return super().step(t, q, v)
-        t = float(t)
-        if not math.isfinite(t):
-            raise InputError(f"time must be finite, got {t}")
+        if type(t) is not float or not math.isfinite(t):
+            t = finite(t, "time")
         robot: AdapterBase = self.robot  # pyright: ignore[reportAssignmentType]
-        robot.place(q, v)
+        try:
+            robot.place(q, v)
+        except (TypeError, ValueError):
+            q, v = numbers(q, "q"), numbers(v, "v")
+            robot.check_state(q, v)
+            robot.place(q, v)
         if self._bodies is None:
             robot.catch_up()
         timing = 0  # a number: the operators of flags cost as much as all of Python here

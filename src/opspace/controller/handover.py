@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from opspace.errors import InputError
 from opspace.law import Profile
+from opspace.tasks.validation import positive
 
 
 class Handover:
@@ -33,13 +32,12 @@ class Handover:
     """
 
     def __init__(self, tau: np.ndarray, duration: float, *, back: bool) -> None:
-        if not (math.isfinite(duration) and duration > 0.0):
-            raise InputError(f"a handover must take more than 0 s, got {duration}")
+        duration = positive(duration, "the duration of a handover")
         if not np.all(np.isfinite(tau)):
             raise InputError("the torque of a handover must be finite")
         self.back = back
         self._tau = tau
-        self._duration = float(duration)
+        self._duration = duration
         self._start: float | None = None
         self._offset = np.zeros(tau.size)
         self._profile = Profile("quintic")

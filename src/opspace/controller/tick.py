@@ -34,7 +34,9 @@ from opspace.law import (
 )
 from opspace.robots.protocol import Robot
 from opspace.stack import Blending, Member, Mixture, Stack, mixture
-from opspace.tasks import JointLimits, PostureTask, TaskTerms
+from opspace.tasks import JointLimits, PostureTask, TaskTerms, TrackingTask
+from opspace.tasks.activations import own_activation
+from opspace.tasks.validation import finite, numbers
 
 BIASES = ("joint", "task")
 """``joint``: Γ = Γ_tasks + b + g, every joint compensated. ``task``: Eq. 3 as printed, the bias is
@@ -156,7 +158,7 @@ class ReferenceController:
         self._handover = Handover(self._joint_torque(tau), duration, back=True)
 
     def _joint_torque(self, tau: ArrayLike) -> np.ndarray:
-        found = np.array(tau, dtype=float)
+        found = numbers(tau, "the torque")
         if found.shape != (self.robot.nv,):
             raise InputError(
                 f"a torque for {self.robot.name!r} has shape ({self.robot.nv},), not {found.shape}"
@@ -194,11 +196,9 @@ class ReferenceController:
             InputError: The state has a wrong size or is not finite, or a reference or activation
                 gave unusable numbers; no torque has been computed.
         """
-        t = float(t)
-        if not math.isfinite(t):
-            raise InputError(f"time must be finite, got {t}")
+        t = finite(t, "time")
         robot = self.robot
-        robot.update(np.asarray(q, dtype=float), np.asarray(v, dtype=float))
+        robot.update(numbers(q, "q"), numbers(v, "v"))
         timing = Status.OK if self._timing is None else self._timing.check(t, robot.q, robot.v)
         if timing & Status.TIME_JUMP and self._holds:
             return self._hold(t, timing)
@@ -206,8 +206,14 @@ class ReferenceController:
         activations = [self._activation(member, t) for member in members]
         terms = [member.task.evaluate(robot, t) for member in members]
         mixed = mixture(members, activations, t, self._blending)
+        if not self._usable(members, terms):
+            return self._hold(t, timing | Status.FAULT)
         task_sets, blend = self._task_sets(members, activations, terms, mixed)
-        tau, info, limits, kept = self._torque(t, task_sets, blend)
+        try:
+            tau, info, limits, kept = self._torque(t, task_sets, blend)
+        except (InputError, np.linalg.LinAlgError):
+            # Everything that went in is finite: these numbers are too large to compute with.
+            return self._hold(t, timing | Status.FAULT)
         tau, status = self._checked(tau, limits)
         status |= timing | kept
         if any(level.scale < 1.0 - 1e-12 for level in info.levels):
@@ -219,18 +225,21 @@ class ReferenceController:
         command = Command(t, tau, status, info.hard_solves, Found(tasks, levels, limits))
         return command if self._handover is None else self._handed_over(command)
 
+    def _usable(self, members: Sequence[Member], terms: Sequence[TaskTerms]) -> bool:
+        """Whether the model and the library's own tasks are finite, and the inertia an inertia."""
+        robot = self.robot
+        numbers = [robot.M, robot.bias]
+        for member, term in zip(members, terms, strict=True):
+            if isinstance(member.task, TrackingTask):
+                numbers += [term.J, term.drift, term.acceleration]
+        if not all(np.isfinite(array).all() for array in numbers):
+            return False
+        return bool(np.linalg.eigvalsh(robot.M)[0] > 0.0)
+
     def _activation(self, member: Member, t: float) -> float:
         """Presence in the stack times the task's own activation."""
         presence = member.presence.value(t)
-        own = member.task.activation
-        if own is None:
-            return presence
-        h = float(own(self.robot, t))
-        if not 0.0 <= h <= 1.0:
-            raise InputError(
-                f"task {member.task.name!r}: activation at t = {t:.6g} s must be in [0, 1], got {h}"
-            )
-        return presence * h
+        return presence * own_activation(member.task, self.robot, t)
 
     def _task_sets(
         self,

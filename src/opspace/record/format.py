@@ -61,9 +61,9 @@ class Column:
 
     def __post_init__(self) -> None:
         parts = self.name.split("/")
-        if not all(part and part == part.strip() for part in parts):
+        if not (all(part and part == part.strip() for part in parts) and self.name.isprintable()):
             raise InputError(f"column name {self.name!r} must be words joined by single slashes")
-        if not self.unit.strip():
+        if not (self.unit.strip() and self.unit.isprintable()):
             raise InputError(f"column {self.name!r} needs a unit ('1' for a number without one)")
 
 

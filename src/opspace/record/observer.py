@@ -12,6 +12,7 @@ from opspace.errors import InputError
 from opspace.record.format import Column, Ended
 from opspace.record.subject import subject_of
 from opspace.record.writer import Recorder
+from opspace.robots import Robot
 from opspace.tasks import Task
 
 State = Callable[[], tuple[np.ndarray, np.ndarray]]
@@ -24,6 +25,19 @@ _TWIST = {
     **{f"r{axis}": f"angular part about {axis}" for axis in "xyz"},
 }
 """Axes of a direction in the world, and what they are."""
+STATUS = Column("status", "1", "status flags of the command")
+
+
+def state_columns(robot: Robot) -> list[Column]:
+    """List the columns t, q, v and tau of a robot's recording."""
+    columns = [Column("t", "s", "time")]
+    for group, unit, what in (
+        ("q", "rad", "joint position"),
+        ("v", "rad/s", "joint velocity"),
+        ("tau", "N·m", "commanded joint torque, bias included"),
+    ):
+        columns += [Column(f"{group}/{j}", unit, f"{what} of {j}") for j in robot.joint_names]
+    return columns
 
 
 def columns_of(
@@ -43,13 +57,7 @@ def columns_of(
     """
     robot, stack = controller.robot, controller.stack
     levels = stack.levels_by_number if levels is None else levels
-    columns = [Column("t", "s", "time")]
-    for group, unit, what in (
-        ("q", "rad", "joint position"),
-        ("v", "rad/s", "joint velocity"),
-        ("tau", "N·m", "commanded joint torque, bias included"),
-    ):
-        columns += [Column(f"{group}/{j}", unit, f"{what} of {j}") for j in robot.joint_names]
+    columns = state_columns(robot)
     columns += [Column(f"tool/{a}", "m", f"{robot.tool} position, {a}") for a in "xyz"]
     for task in [*stack, *tasks]:
         columns.append(Column(f"tasks/{task.name}/activation", "1", f"activation of {task.name}"))
@@ -85,7 +93,7 @@ def columns_of(
     return [
         *columns,
         Column("hard_solves", "1", "hard torques in the blend"),
-        Column("status", "1", "status flags of the command"),
+        STATUS,
     ]
 
 

@@ -109,6 +109,25 @@ class Recorder:
             raise InputError(
                 f"a row of {self.directory} has shape ({len(self.columns)},), not {values.shape}"
             )
+        self._write(values)
+
+    def extend(self, rows: np.ndarray) -> None:
+        """Write several rows at once.
+
+        Args:
+            rows: (rows, number of columns) as for `append`.
+
+        Raises:
+            InputError: The rows have another length.
+            RecordingError: The recorder is closed, or the file cannot be written.
+        """
+        if rows.ndim != 2 or rows.shape[1] != len(self.columns):
+            raise InputError(
+                f"rows of {self.directory} have shape (rows, {len(self.columns)}), not {rows.shape}"
+            )
+        self._write(rows.astype(fmt.DTYPE))
+
+    def _write(self, values: np.ndarray) -> None:
         if self._descriptor is None:
             raise RecordingError(f"{self.directory}: the recording is already closed")
         rest = memoryview(values.tobytes())

@@ -109,23 +109,19 @@ class AdapterBase(ABC):
         """Set a state whose numbers are checked elsewhere; the dynamics follow when somebody asks.
 
         Args:
-            q: (nq,) configuration of a robot without quaternions.
-            v: (nv,) velocity in rad/s (m/s).
+            q: (nq,) array of float64: the configuration of a robot without quaternions.
+            v: (nv,) array of float64: the velocity in rad/s (m/s).
 
         Raises:
-            InputError: A wrong shape, or numbers in another form that are not finite.
+            TypeError: Something else than such an array.
+            ValueError: An array of another shape.
         """
         if self._cache:
             self._cache.clear()
         self._behind = True
-        try:
-            self._q_memory[:] = q  # pyright: ignore[reportArgumentType, reportCallIssue]
-            self._v_memory[:] = v  # pyright: ignore[reportArgumentType, reportCallIssue]
-        except (TypeError, ValueError):
-            position, velocity = np.asarray(q, dtype=float), np.asarray(v, dtype=float)
-            self.check_state(position, velocity)
-            self._q[:] = position
-            self._v[:] = velocity
+        # Views of memory compare form and shape faster than NumPy converts them.
+        self._q_memory[:] = q  # pyright: ignore[reportArgumentType, reportCallIssue]
+        self._v_memory[:] = v  # pyright: ignore[reportArgumentType, reportCallIssue]
 
     def catch_up(self) -> None:
         """Run the dynamics at the state of the last `place`, unless that has been done."""

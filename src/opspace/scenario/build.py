@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from opspace.errors import InputError, OpspaceError, UnknownNameError
 from opspace.robots import Robot, load_robot
 from opspace.scenario.build_tasks import build_tasks, check_configuration, configuration
 from opspace.scenario.events import in_order, insertion_level, late_tasks
+from opspace.scenario.load import to_dict
 from opspace.scenario.schema import Scenario
 from opspace.sim import Disturbances, Plant, Push, StopRule
 from opspace.stack import Stack
@@ -19,6 +21,8 @@ from opspace.tasks import JointLimits, Task
 
 SWITCH = "step"
 """Activation profile of the method ``switch``."""
+SCENARIO_KEY = "scenario"
+"""Where the header of a recording holds its scenario."""
 
 
 @dataclass(frozen=True)
@@ -42,6 +46,12 @@ class Built:
     controller: ReferenceController
     plant: Plant
     stop: StopRule
+
+    @property
+    def header(self) -> dict[str, Any]:
+        """What the header of a recording says of the run, for `opspace.BlackBox` too."""
+        scenario = self.scenario
+        return {SCENARIO_KEY: to_dict(scenario), "seed": scenario.seed, "dt": scenario.dt}
 
 
 def build(scenario: Scenario, controller: type[ReferenceController] = Controller) -> Built:

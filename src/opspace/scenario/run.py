@@ -10,7 +10,7 @@ from opspace.record.format import write_json
 from opspace.record.observer import State, TickRecorder
 from opspace.scenario.build import Built, build
 from opspace.scenario.events import late_tasks, levels_visited
-from opspace.scenario.load import dump_scenario, to_dict
+from opspace.scenario.load import dump_scenario
 from opspace.scenario.metrics import Metrics, measure
 from opspace.scenario.progress import ProgressBar
 from opspace.scenario.references import return_time
@@ -76,7 +76,7 @@ def run_scenario(
     recorder = TickRecorder(
         out,
         built.controller,
-        header_of(scenario),
+        built.header,
         tasks=late_tasks_of(built),
         levels=recorded_levels(built, everywhere=requests is not None),
         truth=truth_of(built.plant),
@@ -91,11 +91,6 @@ def run_scenario(
     if line:
         line.finish(outcome.t)
     return result_of(scenario, out, outcome)
-
-
-def header_of(scenario: Scenario) -> dict[str, object]:
-    """Return what the recording of a scenario says about itself."""
-    return {"scenario": to_dict(scenario), "seed": scenario.seed, "dt": scenario.dt}
 
 
 def late_tasks_of(built: Built) -> list[Task]:

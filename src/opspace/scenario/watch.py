@@ -12,7 +12,6 @@ from opspace.scenario.run import (
     SCENARIO,
     RunResult,
     begin,
-    header_of,
     late_tasks_of,
     recorded_levels,
     result_of,
@@ -68,7 +67,7 @@ def watch_scenario(
     viewer = Viewer(
         built.controller,
         out,
-        header_of(scenario),
+        built.header,
         tasks=late_tasks_of(built),
         levels=recorded_levels(built, everywhere=True),
         truth=truth_of(built.plant),

@@ -13,6 +13,7 @@ UNITS = {
     "max_torque_use": "1",
     "max_joint_speed": "rad/s",
     "position_excess": "rad",
+    "position_outside": "rad",
     "speed_excess": "rad/s",
     "not_finite": "ticks",
     "above_torque_limit": "ticks",
@@ -27,8 +28,10 @@ class Watch:
     """The observer of a run that keeps numbers instead of columns.
 
     ``position_excess`` is how far any joint went beyond a limit that could be respected: one that it
-    had once been able to stop at, v <= v_adm(d) (`opspace.JointLimits`), and from which no push has
-    driven it since. ``speed_excess`` likewise, for joints that were slow enough once.
+    had once been able to stop at, v <= v_adm(d) (`opspace.JointLimits`), and since then neither a
+    push has driven it nor has a tick said ``LIMIT_LOST``. ``speed_excess`` likewise, for joints that
+    were slow enough once. ``position_outside`` asks for no reason: it is how far any joint went beyond a
+    limit that it had once been inside of.
 
     Args:
         built: The run.
@@ -38,7 +41,13 @@ class Watch:
         limits = built.stack.limits
         self._limits = limits
         self._sides: tuple[Side, ...] = () if limits is None else limits.sides
-        self._kept = np.zeros((len(self._sides), 2), dtype=bool)
+        self._sign = np.array([side.sign for side in self._sides])
+        self._index = np.array([side.index for side in self._sides], dtype=int)
+        self._limit = np.array([side.limit for side in self._sides])
+        self._speed = np.array([side.speed for side in self._sides])
+        self._stops = np.zeros(len(self._sides), dtype=bool)
+        self._slow = np.zeros(len(self._sides), dtype=bool)
+        self._inside = np.zeros(len(self._sides), dtype=bool)
         self._plant = built.plant
         self._pushes = built.scenario.plant.pushes
         self._torque_limit = built.robot.torque_limit
@@ -62,7 +71,7 @@ class Watch:
         numbers["above_torque_limit"] += bool(np.any(np.abs(tau) > self._torque_limit))
         for status in self._ticks:
             self._ticks[status] += status in command.status
-        self._watch_limits(command.t, self._plant.q, v)
+        self._watch_limits(command, self._plant.q, v)
 
     @property
     def seconds(self) -> dict[str, float]:
@@ -72,21 +81,24 @@ class Watch:
     def _most(self, name: str, value: float) -> None:
         self.numbers[name] = max(self.numbers[name], value)
 
-    def _watch_limits(self, t: float, q: np.ndarray, v: np.ndarray) -> None:
-        if any(push.at <= t <= push.at + push.duration + self._dt for push in self._pushes):
-            self._kept[:] = False
-        limits = self._limits
+    def _watch_limits(self, command: Command, q: np.ndarray, v: np.ndarray) -> None:
+        limits, t = self._limits, command.t
         if limits is None:
             return
-        for i, side in enumerate(self._sides):
-            distance = side.sign * (side.limit - float(q[side.index]))
-            towards = side.sign * float(v[side.index])
-            if distance >= 0.0 and towards <= limits.allowed_speed(side, distance):
-                self._kept[i, 0] = True
-            if towards <= side.speed:
-                self._kept[i, 1] = True
-            beyond = -distance - limits.clearance
-            if self._kept[i, 0] and beyond > _ROUNDING:
-                self._most("position_excess", beyond)
-            if self._kept[i, 1] and towards > side.speed * (1.0 + _ROUNDING):
-                self._most("speed_excess", towards - side.speed)
+        distance = self._sign * (self._limit - q[self._index])
+        towards = self._sign * v[self._index]
+        beyond = np.maximum(-distance - limits.clearance - _ROUNDING, 0.0)
+        self._inside |= beyond == 0.0
+        self._most("position_outside", float(np.max(beyond, where=self._inside, initial=0.0)))
+        pushed = any(p.at <= t <= p.at + p.duration + self._dt for p in self._pushes)
+        if pushed or Status.LIMIT_LOST in command.status:
+            self._stops[:] = self._slow[:] = False
+            return
+        for i in np.flatnonzero(~self._stops & (distance >= 0.0)):
+            allowed = limits.allowed_speed(self._sides[i], float(distance[i]))
+            self._stops[i] = towards[i] <= allowed
+        self._slow |= towards <= self._speed
+        self._most("position_excess", float(np.max(beyond, where=self._stops, initial=0.0)))
+        over = towards - self._speed
+        fast = self._slow & (over > _ROUNDING * self._speed)
+        self._most("speed_excess", float(np.max(over, where=fast, initial=0.0)))

@@ -12,9 +12,12 @@ from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
 from typing import Any
 
+from opspace.controller.compiled.warm_up import compiled_tick
 from opspace.sweep.plan import SweepPlan
 from opspace.sweep.row import empty_row, run_row
 
+STARTING = 300.0
+"""What a process may take until it begins with its first run, on a machine that is busy, s."""
 POLL = 0.5
 """How often hanging processes are looked for, s."""
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
@@ -26,6 +29,7 @@ class _Worker:
     pipe: Any
     index: int | None = None
     since: float = 0.0
+    started: bool = False
 
 
 def run_here(
@@ -37,7 +41,7 @@ def run_here(
         plan: The sweep.
         indices: Numbers of the runs.
         jobs: How many at a time.
-        timeout: Time allowed to one run, s.
+        timeout: Time allowed to one run, s; it begins when its process is ready for it.
 
     Yields:
         Rows, in the order in which they are finished.
@@ -53,6 +57,9 @@ def run_here(
                 assert worker.index is not None
                 if worker.pipe in ready:
                     row = _received(worker, plan)
+                    if row is None:
+                        worker.started, worker.since = True, time.monotonic()
+                        continue
                 elif time.monotonic() - worker.since > timeout:
                     row = _lost(plan, worker.index, "timed out", f"after {timeout:g} s")
                     worker.process.kill()
@@ -62,7 +69,7 @@ def run_here(
                 if row["ended"] in {"died", "timed out"}:
                     _stop(worker)
                     fresh = _start(plan)
-                    worker.process, worker.pipe = fresh.process, fresh.pipe
+                    worker.process, worker.pipe, worker.started = fresh.process, fresh.pipe, False
                 _assign(worker, waiting)
     finally:
         for worker in workers:
@@ -80,12 +87,13 @@ def _start(plan: SweepPlan) -> _Worker:
 
 def _assign(worker: _Worker, waiting: list[int]) -> None:
     worker.index = waiting.pop() if waiting else None
-    worker.since = time.monotonic()
+    worker.since = time.monotonic() + (0.0 if worker.started else STARTING)
     if worker.index is not None:
         worker.pipe.send(worker.index)
 
 
-def _received(worker: _Worker, plan: SweepPlan) -> dict[str, Any]:
+def _received(worker: _Worker, plan: SweepPlan) -> dict[str, Any] | None:
+    """Take a row from a process; None is its word that it is ready."""
     assert worker.index is not None
     try:
         return worker.pipe.recv()
@@ -113,6 +121,8 @@ def _serve(plan: SweepPlan, pipe: Connection) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     for name in THREADS:
         os.environ[name] = "1"
+    compiled_tick()
+    pipe.send(None)
     while True:
         try:
             index = pipe.recv()

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from opspace.errors import unknown_name
+from opspace.errors import InputError, unknown_name
 from opspace.law import Buffer
-from opspace.tasks.validation import finite_array
+from opspace.tasks.validation import finite_array, shown
 
 if TYPE_CHECKING:
     from opspace.robots.protocol import Robot
+    from opspace.tasks.base import Task
 
 
 class JointBuffer:
@@ -109,3 +111,31 @@ class ActivationProduct:
         for factor in self.factors:
             product *= factor(robot, t)
         return product
+
+
+def own_activation(task: Task, robot: Robot, t: float) -> float:
+    """Evaluate the activation that the user gave a task, 1 where there is none.
+
+    Args:
+        task: The task.
+        robot: The robot at the present state.
+        t: Time, s.
+
+    Returns:
+        h, 0 to 1.
+
+    Raises:
+        InputError: It is not in [0, 1].
+    """
+    if task.activation is None:
+        return 1.0
+    given = task.activation(robot, t)
+    try:
+        h = float(given)
+    except (TypeError, ValueError, OverflowError):
+        h = math.nan
+    if not 0.0 <= h <= 1.0:
+        raise InputError(
+            f"task {task.name!r}: activation at t = {t:.6g} s must be in [0, 1], got {shown(given)}"
+        )
+    return h

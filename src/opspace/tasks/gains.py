@@ -54,7 +54,7 @@ class Gains:
         asked = speed_per_error(self.kp, self.kv) * error
         limited = error.copy()
         for rows, limit in zip(self.groups, max_speed, strict=True):
-            speed = math.sqrt(asked[rows] @ asked[rows])
+            speed = math.hypot(*asked[rows])
             if speed > limit:
                 limited[rows] *= limit / speed
         return limited
@@ -117,5 +117,5 @@ def _speeds(value: float | Sequence[float], count: int, owner: str) -> tuple[flo
     if len(speeds) != count:
         raise InputError(f"task {owner!r}: max_speed needs {count} number(s), not {len(speeds)}")
     if not all(speed > 0.0 for speed in speeds):
-        raise InputError(f"task {owner!r}: max_speed must be above zero, not {value!r}")
+        raise InputError(f"task {owner!r}: max_speed must be above zero, not {list(speeds)}")
     return speeds

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from opspace.errors import InputError, UnknownNameError
 from opspace.tasks.base import Task, TaskTerms
 from opspace.tasks.references.sample import Reference, Sample
-from opspace.tasks.validation import Array, finite_array
+from opspace.tasks.validation import Array, finite_array, shown
 
 if TYPE_CHECKING:
     from opspace.robots.protocol import Robot
@@ -190,7 +190,7 @@ class TrackingTask(Task):
         what = f"task {self.name!r}: reference at t = {t:.6g} s:"
         sample = reference(t)
         if not isinstance(sample, tuple) or len(sample) != 3:
-            raise InputError(f"{what} must give a Sample(x, v, a), not {sample!r}")
+            raise InputError(f"{what} must give a Sample(x, v, a), not {shown(sample)}")
         return Sample(
             self._check_value(sample[0], f"{what} x"),
             self._vector(sample[1], f"{what} v"),

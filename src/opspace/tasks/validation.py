@@ -11,6 +11,10 @@ from opspace.errors import InputError
 
 Array = NDArray[np.float64]
 
+_NUMERIC = "biufO"
+"""Kinds of arrays that may hold real numbers; others are turned into floats in strange ways."""
+_LONG = 80
+
 
 def finite_array(value: ArrayLike, shape: tuple[int | None, ...] | None, what: str) -> Array:
     """Copy a value into a read-only float64 array of the given shape.
@@ -30,7 +34,7 @@ def finite_array(value: ArrayLike, shape: tuple[int | None, ...] | None, what: s
     if shape is not None and not _fits(array.shape, shape):
         raise InputError(f"{what} must have shape {_words(shape)}, not {array.shape}")
     if not np.isfinite(array).all():
-        raise InputError(f"{what} must be finite, not {array.tolist()}")
+        raise InputError(f"{what} must be finite, not {shown(array.tolist())}")
     array.flags.writeable = False
     return array
 
@@ -49,9 +53,12 @@ def numbers(value: ArrayLike, what: str) -> Array:
         InputError: Not numbers, or rows of different lengths.
     """
     try:
-        return np.array(value, dtype=float)
-    except (TypeError, ValueError):
-        raise InputError(f"{what} must be numbers, not {value!r}") from None
+        found = np.array(value)
+        if found.dtype.kind in _NUMERIC:
+            return found.astype(float)
+    except (TypeError, ValueError, OverflowError):
+        pass
+    raise InputError(f"{what} must be numbers, not {shown(value)}")
 
 
 def positive(value: float, what: str) -> float:
@@ -88,11 +95,17 @@ def finite(value: float, what: str) -> float:
     """
     try:
         number = float(value)
-    except (TypeError, ValueError):
-        raise InputError(f"{what} must be a number, not {value!r}") from None
+    except (TypeError, ValueError, OverflowError):
+        raise InputError(f"{what} must be a number, not {shown(value)}") from None
     if not math.isfinite(number):
         raise InputError(f"{what} must be finite, not {number}")
     return number
+
+
+def shown(value: object) -> str:
+    """Write any value on one line that is not too long."""
+    text = " ".join(repr(value).split())
+    return text if len(text) <= _LONG else f"{text[:_LONG]}..."
 
 
 def _fits(got: tuple[int, ...], wanted: tuple[int | None, ...]) -> bool:

@@ -47,6 +47,7 @@ from opspace.robots.base import AdapterBase
 from opspace.robots.motion_axes import FramePlace, MotionAxes
 from opspace.stack import Member
 from opspace.tasks import PostureTask, Task
+from opspace.tasks.activations import own_activation
 from opspace.tasks.motion_task import MotionTask
 from opspace.tasks.motions import CenterOfMass, RelativeFrame, WorldFrame
 from opspace.tasks.quantities import Orientation, Pose, Position
@@ -64,20 +65,6 @@ def kind_of(task: Task) -> int:
     if isinstance(task, PostureTask) and method is PostureTask.evaluate:
         return JOINTS
     return OWN
-
-
-def own_activation(task: Task, robot: AdapterBase, t: float) -> float:
-    """Evaluate the activation that the user gave a task.
-
-    Raises:
-        InputError: It is not in [0, 1].
-    """
-    h = 1.0 if task.activation is None else float(task.activation(robot, t))
-    if not 0.0 <= h <= 1.0:
-        raise InputError(
-            f"task {task.name!r}: activation at t = {t:.6g} s must be in [0, 1], got {h}"
-        )
-    return h
 
 
 def refresh(tasks: list[Packed], robot: AdapterBase, t: float) -> None:
