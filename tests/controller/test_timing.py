@@ -8,10 +8,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from opspace.controller import Controller, ReferenceController, Status
+from opspace.controller.compiled.plan import Plan
 from opspace.errors import InputError, UnknownNameError
 from opspace.robots import load_robot
 from opspace.stack import Stack
-from opspace.tasks import PositionTask, PostureTask
+from opspace.tasks import JointTask, PositionTask, PostureTask
 
 BOTH = pytest.mark.parametrize("kind", [Controller, ReferenceController])
 
@@ -110,3 +111,14 @@ def test_whatever_comes_in_what_goes_out_is_finite(kind, q, v, t):
         command = controller.step(t, q, v)
     assert np.isfinite(command.tau).all()
     assert np.all(np.abs(command.tau) <= controller.robot.torque_limit * (1 + 1e-12))
+
+
+def test_more_tasks_than_are_compiled_are_watched_as_well():
+    tasks = [JointTask("joint1", name=f"joint {k}") for k in range(40)]
+    controller = Controller(load_robot("puma560"), Stack([tasks]), period=1e-3)
+    assert not Plan.fits(controller.stack.members)
+    first, second, late = ticks(controller, [0.0, 0.001, 0.004])
+    assert Status.TIME_JUMP not in first.status | second.status | late.status
+    assert Status.LATE in late.status
+    with pytest.raises(InputError, match="nan"):
+        controller.step(0.005, np.full(6, np.nan), np.zeros(6))

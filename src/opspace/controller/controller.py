@@ -88,7 +88,8 @@ class Controller(ReferenceController):
         plan = self._plan
         if plan is None or members is not plan.members:
             if not Plan.fits(members):
-                return super().step(t, robot.q, robot.v)
+                robot.update(robot.q, robot.v)
+                return self._answer(t, members, STATUSES[timing])
             plan = self._plan = self._planned(members, axes)
         plan.refresh(robot, t)
         answer = self._tick(t, plan.handle) if self._observer is None else self._learn(t, plan)

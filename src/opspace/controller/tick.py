@@ -202,7 +202,11 @@ class ReferenceController:
         timing = Status.OK if self._timing is None else self._timing.check(t, robot.q, robot.v)
         if timing & Status.TIME_JUMP and self._holds:
             return self._hold(t, timing)
-        members = self.stack.begin_tick(t)
+        return self._answer(t, self.stack.begin_tick(t), timing)
+
+    def _answer(self, t: float, members: Sequence[Member], timing: Status) -> Command:
+        """Compute the torque of these tasks for the robot's present state."""
+        robot = self.robot
         activations = [self._activation(member, t) for member in members]
         terms = [member.task.evaluate(robot, t) for member in members]
         mixed = mixture(members, activations, t, self._blending)
