@@ -41,8 +41,6 @@ class Timed(osc.Viewer):
     def observe(self, q, v, command):
         """See `opspace.Observer.observe`."""
         self._recorder.observe(q, v, command)
-        if not self._started:
-            self._begin()
         self._desk.observe(q, v, command)
         self.clock.ticks.append((time.perf_counter(), time.perf_counter() - self.clock.begun))
         self._pacing.observe(q, v, command)
@@ -87,7 +85,6 @@ def watched():
     os.sched_setaffinity(process.pid, {1})
 
     def visit():
-        viewer._page.wait()
         os.sched_setaffinity(0, {1})  # this thread, and the browser that it starts
         time.sleep(4.0)
         with sync_playwright() as playwright:

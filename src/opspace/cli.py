@@ -391,7 +391,9 @@ def view(
     host: Annotated[
         str, typer.Option(help="Address to listen at; 0.0.0.0 lets other machines in.")
     ] = "127.0.0.1",
-    port: Annotated[int, typer.Option(help="Port; the next free one where it is in use.")] = 8080,
+    port: Annotated[
+        int, typer.Option(min=1, max=65535, help="Port; the next free one if it is in use.")
+    ] = 8080,
     speed: Annotated[float, typer.Option(help="Seconds of the run per second.")] = 1.0,
     duration: Annotated[float, typer.Option(help="Seconds after which the run ends.")] = 3600.0,
     start: Annotated[

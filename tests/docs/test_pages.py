@@ -40,7 +40,7 @@ for number, (language, title, text) in enumerate(json.load(sys.stdin), 1):
     elif language == "sh":
         for line in text.splitlines():
             words = shlex.split(line, comments=True)
-            if words[:1] != ["opspace"] or words[1] == "sweep":
+            if words[:1] != ["opspace"] or words[1] in ("sweep", "view"):
                 continue
             if words[1] == "check" or any(Path(word).exists() for word in words[2:]):
                 # The first half second of a run shows whether its file is good.

@@ -77,20 +77,35 @@ JSON = st.recursive(
     lambda inner: st.lists(inner, max_size=3),
     max_leaves=4,
 )
-KEYS = st.sampled_from(["kind", "tasks", "level", "duration", "position", "kp", "color"])
-CONTENT = st.dictionaries(KEYS, JSON | st.sampled_from(sorted(KINDS)), max_size=5)
+ODD = st.sampled_from([True, 10**400, -1, [], {}, [1.0, 2.0], "5", [0.0] * 4, [1e30] * 3])
+KEYS = st.sampled_from(
+    ["level", "duration", "position", "orientation", "kp", "color"],
+)
+VALUES = JSON | ODD | st.floats(-1e3, 1e3) | POINTS.map(list)
+TASKS = st.sampled_from(["position", "elbow", "posture", "nobody"])
+CONTENT = st.builds(
+    lambda kind, tasks, rest: {"kind": kind, "tasks": tasks, **rest},
+    st.sampled_from(sorted(KINDS)) | JSON,
+    st.lists(TASKS, min_size=1, max_size=2) | JSON,
+    st.dictionaries(KEYS, VALUES, max_size=3),
+)
 
 
 @given(CONTENT)
 def test_anything_else_is_refused_with_an_error_of_ours(content):
     run = _shared_run()
     try:
-        run.changes.apply(RunRequest.read(content), 0.0)
+        request = RunRequest.read(content)
+        run.changes.apply(request, 0.0)
+        run.changes.follow(1e3)
     except OpspaceError:
         return
     # What is taken is a request in every respect.
     assert content["kind"] in KINDS
-    assert set(content) <= {"kind", "tasks", *KINDS[content["kind"]]}
+    assert {k for k, v in content.items() if v is not None} <= {
+        "kind", "tasks", *KINDS[content["kind"]],
+    }  # fmt: skip
+    json.dumps(request.plain(), allow_nan=False)
 
 
 def _shared_run(found=[]):  # noqa: B006 - one for all examples, which change nothing when refused
@@ -108,6 +123,10 @@ def _shared_run(found=[]):  # noqa: B006 - one for all examples, which change no
         ({"kind": "insert", "tasks": ["a"]}, "needs level"),
         ({"kind": "gain", "tasks": ["a"]}, "needs kp"),
         ({"tasks": ["a"]}, "kind"),
+        ({"kind": "gain", "tasks": ["a"], "kp": "5"}, "kp"),
+        ({"kind": "gain", "tasks": ["a"], "kp": True}, "kp"),
+        ({"kind": "remove", "tasks": "a"}, "tasks"),
+        ({"kind": "lead", "tasks": ["a"], "position": [0.0, 1.0]}, "position"),
     ],
 )
 def test_the_error_says_what_is_wrong(content, says):
@@ -198,3 +217,61 @@ def test_a_log_that_is_none_is_refused(tmp_path):
     log.write_text('{"at": 0.1, "kind": "remove", "tasks": ["position"]}\n{"at": 1}\n')
     with pytest.raises(RecordingError, match=":2"):
         RequestPlayer(run.changes, log)
+
+
+def test_numbers_of_numpy_are_numbers(tmp_path):
+    run, answers = Run(), []
+    log = tmp_path / "requests.jsonl"
+    desk = RequestDesk(run.changes, log, lambda request, reason: answers.append(reason))
+    desk.ask(RunRequest("lead", ("position",), position=np.array([0.4, 0.1, 0.5])))
+    desk.ask(RunRequest("gain", ("position",), kp=np.float32(50.0)))
+    desk.ask(RunRequest("insert", ("elbow",), level=np.int64(1)))
+    run.go(0.01, desk)
+    desk.close()
+    assert answers == ["", "", ""]
+    assert len(log.read_text().splitlines()) == 3
+
+
+def test_a_gain_that_a_task_cannot_have_is_refused_before_it_is_on_its_way():
+    robot = load_robot("puma560")
+    task = PositionTask(kp=0.0, kv=0.0, max_speed=0.5)
+    controller = Controller(robot, Stack([task, PostureTask()]))
+    answers = []
+    desk = RequestDesk(Changes(controller), None, lambda request, reason: answers.append(reason))
+    desk.ask(RunRequest("gain", ("position",), kp=10.0))
+    simulate(Plant(robot, robot.q_reference), controller, 0.01, [desk])
+    assert "max_speed" in answers[0]
+    assert task.kp == 0.0
+
+
+def test_what_cannot_be_planned_is_refused_and_the_run_goes_on():
+    run, answers = Run(), []
+    desk = RequestDesk(run.changes, None, lambda request, reason: answers.append(reason))
+    desk.ask(RunRequest("lead", ("position",), position=(1e9, 0.0, 0.0)))
+    assert len(run.go(0.01, desk)) == 10
+    assert "JerkLimited" in answers[0]
+
+
+def test_the_goal_of_a_pose_that_is_not_given_is_kept():
+    robot = load_robot("puma560")
+    task = PoseTask(kp=400.0)
+    controller = Controller(robot, Stack([task, PostureTask(kp=20.0)]))
+    changes, plant = Changes(controller), Plant(robot, robot.q_reference)
+    simulate(plant, controller, 0.002)
+    place = robot.position(robot.frame_id(robot.tool)) + [0.03, 0.0, -0.02]
+    changes.apply(RunRequest("lead", ("pose",), orientation=(0.99, 0.1, 0.0, 0.0995)), plant.t)
+    simulate(plant, controller, 0.1)
+    changes.apply(RunRequest("lead", ("pose",), position=place), plant.t)
+    reference = task.target(plant.t + 60.0)
+    np.testing.assert_allclose(reference.x[:3, 3], place)
+    turned = task.quantity.check((place, (0.99, 0.1, 0.0, 0.0995)), "goal")
+    np.testing.assert_allclose(reference.x, turned, atol=1e-12)
+
+
+def test_a_log_must_go_forward_in_time(tmp_path):
+    run, log = Run(), tmp_path / "requests.jsonl"
+    line = '{{"at": {}, "kind": "remove", "tasks": ["position"]}}\n'
+    for times, says in (((0.2, 0.1), "before"), (("NaN",), "finite")):
+        log.write_text("".join(line.format(t) for t in times))
+        with pytest.raises(RecordingError, match=says):
+            RequestPlayer(run.changes, log)

@@ -33,9 +33,12 @@ def frame(tasks=(), levels=(), q=(0.5,), limits=None):
     return Frame(1.25, values, np.zeros(1), np.array([3.0]), tasks, levels, limits or {}, 1)
 
 
+ABOUT = {"tasks": {"hold": {}}}
+
+
 def test_a_growing_recording_shows_complete_rows_only(tmp_path):
     wanted = columns("hold")
-    with Recorder(tmp_path, wanted, {}) as recorder:
+    with Recorder(tmp_path, wanted, ABOUT) as recorder:
         growing = GrowingRecording(tmp_path)
         assert growing.refresh() == 0
         row = np.arange(len(wanted), dtype=float)
@@ -56,7 +59,7 @@ def test_a_growing_recording_shows_complete_rows_only(tmp_path):
 
 
 def test_the_past_of_a_tick(tmp_path):
-    with Recorder(tmp_path, columns(), {}) as recorder:
+    with Recorder(tmp_path, columns(), {"tasks": {}}) as recorder:
         for k in range(1000):
             recorder.append(np.full(len(columns()), 0.001 * k))
         reader = FrameReader(GrowingRecording(tmp_path))
@@ -78,7 +81,7 @@ def test_what_is_no_recording_is_refused(tmp_path):
 
 
 def test_a_recording_without_torques_cannot_be_shown(tmp_path):
-    with Recorder(tmp_path, [Column("t", "s")], {}), pytest.raises(InputError, match="status"):
+    with Recorder(tmp_path, [Column("t", "s")], ABOUT), pytest.raises(InputError, match="status"):
         FrameReader(GrowingRecording(tmp_path))
 
 

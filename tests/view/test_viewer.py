@@ -1,17 +1,21 @@
 """A run that is watched is the same run, and outlives its page."""
 
+import json
 import os
 import signal
 import subprocess
 import sys
 import time
 import urllib.request
+from pathlib import Path
 from threading import Event, Thread
 
 import numpy as np
 import pytest
 
-from opspace.record import load
+from opspace.cli import main
+from opspace.errors import OpspaceError
+from opspace.record import Column, Recorder, load
 from opspace.scenario.build import build
 from opspace.scenario.replay import replay
 from opspace.scenario.run import SCENARIO, begin, late_tasks_of, recorded_levels, run_scenario
@@ -114,6 +118,84 @@ def test_a_run_does_not_mind_that_its_page_dies(tmp_path):
     assert watch(tmp_path / "run", kill).completed
     assert load(tmp_path / "run").ended.how == "completed"
     assert len(load(tmp_path / "run")) == round(DURATION / 0.001)
+
+
+def test_a_run_that_was_paused_goes_on_when_its_page_dies(tmp_path):
+    def pause_and_kill(viewer, address):
+        viewer._pacing.pause()
+        time.sleep(0.1)
+        os.kill(viewer._page._process.pid, signal.SIGKILL)
+
+    assert watch(tmp_path / "run", pause_and_kill).completed
+
+
+def test_a_page_that_does_not_read_delays_nothing(tmp_path):
+    def stop(viewer, address):
+        os.kill(viewer._page._process.pid, signal.SIGSTOP)
+        for _ in range(3000):
+            viewer.ask(RunRequest("remove", ("nobody",)))
+
+    assert watch(tmp_path / "run", stop).completed
+
+
+ODD = [
+    {},
+    {"control": "speed", "value": "fast"},
+    {"control": "speed", "value": 1e-300},
+    {"control": "dance"},
+    {"request": 5},
+    {"request": None},
+    {"request": {"kind": "lead", "tasks": [["position"]], "position": [1e300, 0.0, 0.0]}},
+]
+
+
+def test_nothing_that_a_page_says_hurts(tmp_path):
+    def say(viewer, address):
+        for message in ODD:
+            viewer._page._take(json.dumps(message))
+        viewer._page._take('{"half')
+        viewer._page._take(json.dumps({"request": {"kind": "remove", "tasks": ["posture"]}}))
+
+    assert watch(tmp_path / "run", say).completed
+    # The last one was heard: whoever listens is still there.
+    assert len((tmp_path / "run" / FILE).read_text().splitlines()) == 1
+
+
+def test_a_page_leaves_with_a_run_that_is_killed(tmp_path):
+    """Also before the first tick, when there is nothing to show yet."""
+    program = (
+        "import os, signal, opspace as osc\n"
+        "robot = osc.load_robot('puma560')\n"
+        "controller = osc.Controller(robot, osc.Stack([osc.PostureTask()]))\n"
+        f"viewer = osc.Viewer(controller, {str(tmp_path / 'run')!r}, port=18380)\n"
+        "print(viewer._page._process.pid, flush=True)\n"
+        "os.kill(os.getpid(), signal.SIGKILL)\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", program], check=False, stdout=subprocess.PIPE, text=True
+    )
+    page = int(done.stdout.split()[-1])
+    end = time.monotonic() + 30.0
+    while (
+        Path(f"/proc/{page}/stat").exists() and " Z " not in Path(f"/proc/{page}/stat").read_text()
+    ):
+        assert time.monotonic() < end, "an orphan"
+        time.sleep(0.1)
+
+
+def test_a_page_that_cannot_be_shown_says_why(tmp_path):
+    with pytest.raises(OpspaceError, match=r"cannot be shown: \w*Error: ."):
+        watch(tmp_path / "run", host="300.1.1.1")
+    assert load(tmp_path / "run").ended.how == "crashed"
+
+
+def test_a_recording_without_a_tick_is_refused(tmp_path, capsys):
+    with Recorder(tmp_path / "run", [Column("t", "s")], {}):
+        pass
+    with pytest.raises(SystemExit) as end:
+        main(["view", str(tmp_path / "run")])
+    assert end.value.code == 2
+    assert "without a tick" in capsys.readouterr().err
 
 
 def command(*words, **options):

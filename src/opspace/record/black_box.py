@@ -175,7 +175,7 @@ def _numbers(values: ArrayLike | float, size: int) -> np.ndarray:
     """Read as many numbers; all of them are NaN where the values are something else."""
     try:
         return np.array(values, dtype=float).reshape(size)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         return np.full(size, np.nan)
 
 

@@ -13,7 +13,7 @@ from opspace.robots.protocol import Robot
 from opspace.tasks import Task
 from opspace.tasks.leading import can_be_led
 from opspace.tasks.motion_task import MotionTask
-from opspace.tasks.motions import CenterOfMass
+from opspace.tasks.motions import CenterOfMass, WorldFrame
 from opspace.tasks.quantities import Orientation, Position
 
 
@@ -71,8 +71,22 @@ def _task(task: Task, level: float | None) -> dict[str, Any]:
         "kp": np.asarray(task.kp).tolist(),
         "level": level,
         "led_by": _led_by(task),
-        "frame": getattr(task.source, "frame", None) if isinstance(task, MotionTask) else None,
-        "center_of_mass": isinstance(task, MotionTask) and isinstance(task.source, CenterOfMass),
+        **(_place(task) if can_be_led(task) else {}),
+    }
+
+
+def _place(task: Task) -> dict[str, Any]:
+    """Tell where the motion of a task is measured, and which rows of it its error has."""
+    assert isinstance(task, MotionTask)
+    source = task.source
+    frame = source if isinstance(source, WorldFrame) else None
+    offset = None if frame is None else frame.offset
+    return {
+        "frame": None if frame is None else frame.frame,
+        "offset": None if offset is None else offset.tolist(),
+        "center_of_mass": isinstance(source, CenterOfMass),
+        "selection": task.selection.tolist(),
+        "in_tool_axes": task.in_tool_axes,
     }
 
 

@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import math
 import time
+from numbers import Real
 from threading import Condition
 
 import numpy as np
 
 from opspace.controller import Command
 from opspace.errors import InputError
+
+SLOWEST = 1e-3
+"""Least seconds of the run per second of the clock."""
 
 BEHIND = 0.1
 """Seconds that a run may be late before it gives up catching up."""
@@ -24,7 +28,7 @@ class Pacing:
         speed: Seconds of the run per second of the clock; inf is as fast as it goes.
 
     Raises:
-        InputError: The speed is not above 0.
+        InputError: The speed is below `SLOWEST`.
     """
 
     def __init__(self, speed: float = 1.0) -> None:
@@ -32,7 +36,6 @@ class Pacing:
         self._speed = _speed(speed)
         self._paused = False
         self._steps = 0
-        self._closed = False
         self._anchor: tuple[float, float] | None = None
 
     @property
@@ -55,12 +58,12 @@ class Pacing:
     def pause(self) -> None:
         """Let the run wait before its next tick."""
         with self._changed:
-            self._paused = True
+            self._paused, self._steps = True, 0
 
     def resume(self) -> None:
         """Let it go on."""
         with self._changed:
-            self._paused = False
+            self._paused, self._steps = False, 0
             self._anchor = None
             self._changed.notify_all()
 
@@ -70,31 +73,26 @@ class Pacing:
             self._steps += ticks
             self._changed.notify_all()
 
-    def close(self) -> None:
-        """Let a paused run go on as fast as it can, to its end."""
-        with self._changed:
-            self._closed = True
-            self._changed.notify_all()
-
     def observe(self, q: np.ndarray, v: np.ndarray, command: Command) -> None:
         """Wait until this tick is due, and while the run is paused."""
         del q, v
         if self._paused:
             self._wait()
-        if self._closed or math.isinf(self._speed):
+        if math.isinf(self._speed):
             return
         now = time.perf_counter()
         if self._anchor is None:
             self._anchor = (now, command.t)
         due = self._anchor[0] + (command.t - self._anchor[1]) / self._speed
         if due > now:
-            time.sleep(due - now)
+            with self._changed:
+                self._changed.wait(due - now)
         elif now - due > BEHIND:
             self._anchor = (now, command.t)
 
     def _wait(self) -> None:
         with self._changed:
-            while self._paused and not self._closed and self._steps == 0:
+            while self._paused and self._steps == 0:
                 self._changed.wait()
             if self._steps > 0:
                 self._steps -= 1
@@ -102,6 +100,6 @@ class Pacing:
 
 
 def _speed(value: float) -> float:
-    if not value > 0.0:
-        raise InputError(f"the speed must be above 0, got {value}")
+    if not isinstance(value, Real) or not float(value) >= SLOWEST:
+        raise InputError(f"the speed must be a number of at least {SLOWEST:g}, got {value!r}")
     return float(value)

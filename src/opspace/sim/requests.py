@@ -6,6 +6,7 @@ import json
 from collections import deque
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, fields
+from numbers import Real
 from pathlib import Path
 from types import MappingProxyType
 from typing import IO, Any
@@ -17,6 +18,7 @@ from opspace.errors import InputError, OpspaceError, RecordingError, unknown_nam
 from opspace.law import Profile
 from opspace.tasks import Task
 from opspace.tasks.leading import lead
+from opspace.tasks.validation import finite, finite_array
 
 KINDS: Mapping[str, frozenset[str]] = MappingProxyType(
     {
@@ -63,8 +65,11 @@ class RunRequest:
     kp: float | None = None
 
     def __post_init__(self) -> None:
-        if self.kind not in KINDS:
-            raise unknown_name("request", self.kind, KINDS)
+        if not isinstance(self.kind, str) or self.kind not in KINDS:
+            raise unknown_name("request", str(self.kind), KINDS)
+        if isinstance(self.tasks, str) or not all(isinstance(name, str) for name in self.tasks):
+            raise InputError(f"request {self.kind!r}: tasks must be names, not {self.tasks!r}")
+        self._convert()
         many = 2 if self.kind == "swap" else 1
         if len(self.tasks) != many:
             raise InputError(f"request {self.kind!r} takes {many} task(s), not {list(self.tasks)}")
@@ -73,6 +78,22 @@ class RunRequest:
             raise InputError(f"request {self.kind!r} does not take {', '.join(wrong)}")
         if (needed := _NEEDED.get(self.kind)) and needed not in given:
             raise InputError(f"request {self.kind!r} needs {needed}")
+
+    def _convert(self) -> None:
+        """Turn what was given into plain numbers, or refuse it."""
+        what = f"request {self.kind!r}:"
+        for name in ("level", "duration", "kp"):
+            value = getattr(self, name)
+            if value is not None:
+                object.__setattr__(self, name, _number(value, f"{what} {name}"))
+        for name in ("duration", "kp"):
+            if (getattr(self, name) or 0.0) < 0.0:
+                raise InputError(f"{what} {name} must be at least 0, not {getattr(self, name)}")
+        for name, size in (("position", 3), ("orientation", 4)):
+            value = getattr(self, name)
+            if value is not None:
+                found = finite_array(value, (size,), f"{what} {name}")
+                object.__setattr__(self, name, tuple(found.tolist()))
 
     @classmethod
     def read(cls, content: Mapping[str, Any]) -> RunRequest:
@@ -89,6 +110,8 @@ class RunRequest:
             UnknownNameError: A kind that there is not.
         """
         known = [f.name for f in fields(cls)]
+        if not isinstance(content, Mapping):
+            raise InputError(f"a request is a mapping, not {content!r}")
         for key in content:
             if key not in known:
                 raise InputError(f"a request has no {key!r} (valid: {', '.join(known)})")
@@ -125,6 +148,12 @@ class _GainRamp:
         return t >= self.begin + self.duration
 
 
+def _number(value: object, what: str) -> float:
+    if not isinstance(value, Real) or isinstance(value, bool):
+        raise InputError(f"{what} must be a number, not {value!r}")
+    return finite(value, what)  # pyright: ignore[reportArgumentType]
+
+
 class Changes:
     """Applies requests to the tasks of a controller, for the thread that ticks.
 
@@ -135,7 +164,11 @@ class Changes:
 
     def __init__(self, controller: ReferenceController, tasks: Iterable[Task] = ()) -> None:
         self._controller = controller
-        self._tasks = {task.name: task for task in [*tasks, *controller.stack]}
+        late = list(tasks)
+        for task in late:
+            # Names are looked up now: a task may be led before it is inserted.
+            controller.stack.prepare(task)
+        self._tasks = {task.name: task for task in [*late, *controller.stack]}
         self._ramps: dict[str, _GainRamp] = {}
 
     def apply(self, request: RunRequest, t: float) -> None:
@@ -166,6 +199,7 @@ class Changes:
                 place = {"position": request.position, "orientation": request.orientation}
                 lead(task, self._controller.robot, t, **place)
             case _:
+                assert request.kp is not None
                 self._change_gain(task, request.kp, t, duration)
 
     def follow(self, t: float) -> None:
@@ -175,13 +209,12 @@ class Changes:
             if ramp.over(t):
                 del self._ramps[name]
 
-    def _change_gain(self, task: Task, kp: float | None, t: float, duration: float) -> None:
-        start, assigned = task.kp, np.asarray(kp, dtype=float)
-        if assigned.ndim or not np.isfinite(assigned) or assigned < 0.0:
-            raise InputError(f"task {task.name!r}: kp must be a number of at least 0, not {kp!r}")
-        if not (np.isfinite(duration) and duration >= 0.0):
-            raise InputError(f"the duration must be finite and >= 0 s, got {duration!r}")
-        self._ramps[task.name] = _GainRamp(start, float(assigned), t, duration)
+    def _change_gain(self, task: Task, kp: float, t: float, duration: float) -> None:
+        start = task.kp
+        # Refused now, if at all: between two ticks nobody sees it.
+        task.kp = kp
+        task.kp = start
+        self._ramps[task.name] = _GainRamp(start, kp, t, duration)
 
     def _task(self, name: str) -> Task:
         try:
@@ -229,8 +262,9 @@ class RequestDesk:
     def _deal(self, request: RunRequest, t: float) -> None:
         try:
             self._changes.apply(request, t)
-        except OpspaceError as error:
-            self._answer(request, str(error))
+        # Whatever is wrong with what somebody asks, the robot goes on.
+        except Exception as error:
+            self._answer(request, str(error) or type(error).__name__)
             return
         if self._log is not None:
             self._log.write(json.dumps({"at": t, **request.plain()}, ensure_ascii=False) + "\n")
@@ -270,7 +304,9 @@ def _read(log: Path) -> list[tuple[float, RunRequest]]:
     for number, line in enumerate(lines, start=1):
         try:
             content = json.loads(line)
-            at = float(content.pop("at"))
+            at = finite(content.pop("at"), "at")
+            if found and at < found[-1][0]:
+                raise InputError(f"at = {at:g} s is before the line above")
             found.append((at, RunRequest.read(content)))
         except (OpspaceError, ValueError, TypeError, AttributeError, KeyError) as error:
             raise RecordingError(f"{log}:{number} is no request: {error}") from None

@@ -68,7 +68,7 @@ def lead(
         raise InputError(f"task {task.name!r} has no target in the world that could be led")
     now, quantity = task.desired(robot, t), task.quantity
     if isinstance(quantity, Pose):
-        task.target = _pose(now, t, position, orientation)
+        task.target = _pose(now, t, *_goals(task, now, position, orientation))
     elif isinstance(quantity, Position) and position is not None and orientation is None:
         task.target = _position(now, t, position)
     elif isinstance(quantity, Orientation) and orientation is not None and position is None:
@@ -90,12 +90,22 @@ def _orientation(now: Sample, t: float, goal: ArrayLike) -> OrientationJerkLimit
     )
 
 
-def _pose(
-    now: Sample, t: float, position: ArrayLike | None, orientation: ArrayLike | None
-) -> Reference:
+def _goals(
+    task: MotionTask, now: Sample, position: ArrayLike | None, orientation: ArrayLike | None
+) -> tuple[ArrayLike, ArrayLike]:
+    """Fill in the goals that are kept: those of a way that is being led, or where the target is."""
+    led, kept = task.target, (now.x[:3, 3], now.x[:3, :3])
+    if isinstance(led, PoseReference):
+        ways = (led.position, led.orientation)
+        if isinstance(ways[0], JerkLimited) and isinstance(ways[1], OrientationJerkLimited):
+            kept = (ways[0].goal, ways[1].goal)
+    return (
+        kept[0] if position is None else position,
+        np.array(kept[1]) if orientation is None else orientation,
+    )
+
+
+def _pose(now: Sample, t: float, position: ArrayLike, orientation: ArrayLike) -> Reference:
     linear = Sample(now.x[:3, 3], now.v[:3], now.a[:3])
     angular = Sample(now.x[:3, :3], now.v[3:], now.a[3:])
-    return PoseReference(
-        _position(linear, t, linear.x if position is None else position),
-        _orientation(angular, t, np.array(angular.x) if orientation is None else orientation),
-    )
+    return PoseReference(_position(linear, t, position), _orientation(angular, t, orientation))

@@ -15,7 +15,6 @@ from pathlib import Path
 from threading import Lock, Thread
 from typing import Any
 
-from opspace.errors import OpspaceError
 from opspace.view.controls import Ask
 from opspace.view.page import PICTURES, Page
 
@@ -28,19 +27,21 @@ def main() -> None:
     parser.add_argument("--port", type=int, required=True)
     given = parser.parse_args()
     say = _speaker()
+    pages: list[Page] = []
+    # From the first moment on: a page whose run is gone must not stay.
+    Thread(target=_listen, args=(pages,), daemon=True).start()
     try:
         page = Page(given.directory, given.host, given.port, say)
-    except (OpspaceError, OSError) as error:
+    # Whatever it is, the run tells it to whoever wanted to see the page.
+    except Exception as error:
         say({"failed": f"{type(error).__name__}: {error}"})
         sys.exit(2)
+    pages.append(page)
     page.on_visit(lambda: say({"visited": True}))
     say({"address": page.address})
-    closed: list[bool] = []
-    Thread(target=_listen, args=(page, closed), daemon=True).start()
-    while not closed:
+    while True:
         page.show()
         time.sleep(1.0 / PICTURES)
-    page.close()
 
 
 def _speaker() -> Ask:
@@ -58,15 +59,19 @@ def _speaker() -> Ask:
     return say
 
 
-def _listen(page: Page, closed: list[bool]) -> None:
-    """Pass on what the run says, until it is gone."""
-    for line in sys.stdin:
-        message = json.loads(line)
-        if message.get("ended"):
-            page.end()
-        else:
-            page.answer(message["answer"], message["reason"])
-    closed.append(True)
+def _listen(pages: list[Page]) -> None:
+    """Pass on what the run says, and leave with it."""
+    try:
+        for line in sys.stdin:
+            message = json.loads(line)
+            for page in pages:
+                if message.get("ended"):
+                    page.end()
+                else:
+                    page.answer(message["answer"], message["reason"])
+    finally:
+        # The web server has threads that would wait for browsers.
+        os._exit(0)
 
 
 if __name__ == "__main__":

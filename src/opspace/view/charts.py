@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 import viser
 from viser import uplot
@@ -75,9 +73,8 @@ def torque_columns(reader: FrameReader) -> dict[str, list[str]]:
 
 
 def sigma_columns(reader: FrameReader) -> dict[str, list[str]]:
-    """List the singular values of every level that has directions in the world."""
+    """List the singular values of every level."""
     return {
         f"level {level.number:g}": reader.recording.group(f"levels/{level.number:g}/sigma")
         for level in reader.at(0).levels
-        if not math.isnan(level.weakest[0])
     }

@@ -36,7 +36,7 @@ class RunControls:
         self.paused = False
         self.speed = 1.0
         self.time = 0.0
-        self._ask = ask
+        self._ask, self._steps = ask, 0
         self._buttons = server.gui.add_button_group("Run", ("Pause", "Go on", "Step", "Newest"))
         self._speed = server.gui.add_dropdown("Speed", SPEEDS, initial_value="1×")
         self._slider = server.gui.add_slider("Time [s]", 0.0, 1.0, 0.001, 0.0)
@@ -56,6 +56,11 @@ class RunControls:
         if abs(self._slider.value - self.time) > 1e-9:
             self._slider.value = self.time
 
+    def take_steps(self) -> int:
+        """Return how many ticks to go on, once."""
+        steps, self._steps = self._steps, 0
+        return steps
+
     def end(self) -> None:
         """Let a run that went on be over: it can still be played."""
         self._ask, self.paused = None, True
@@ -66,7 +71,7 @@ class RunControls:
         elif button == "Step":
             self.paused = True
             if self._ask is None:
-                self.follows, self.time = False, self.time + 0.001
+                self.follows, self._steps = False, self._steps + 1
             else:
                 self.follows = True
                 self._ask({"control": "step"})

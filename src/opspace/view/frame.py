@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from opspace.errors import InputError
 from opspace.record.growing import GrowingRecording
 
 
@@ -81,10 +82,14 @@ class FrameReader:
         recording: The recording.
 
     Raises:
-        InputError: It has no states or torques.
+        InputError: It has no states or torques, or does not tell its tasks.
     """
 
     def __init__(self, recording: GrowingRecording) -> None:
+        if "tasks" not in recording.header:
+            raise InputError(
+                f"{recording.directory} does not say what it is about; record it again"
+            )
         self.recording = recording
         self._t, self._status = recording.columns(["t", "status"])
         self._q, self._v, self._tau = (
@@ -92,8 +97,8 @@ class FrameReader:
         )
         limits = recording.group("limits")
         self._limits = {name.removeprefix("limits/"): recording.index[name] for name in limits}
-        self._tasks = {name: self._task(name) for name in _names(recording, "tasks")}
-        self._levels = {float(name): self._level(name) for name in _names(recording, "levels")}
+        self._tasks = {name: self._task(name) for name in recording.header["tasks"]}
+        self._levels = {float(name): self._level(name) for name in _levels(recording)}
 
     @property
     def joints(self) -> list[str]:
@@ -165,5 +170,5 @@ class FrameReader:
         return sigma, activation, weakest
 
 
-def _names(recording: GrowingRecording, group: str) -> list[str]:
-    return list(dict.fromkeys(name.split("/")[1] for name in recording.group(group)))
+def _levels(recording: GrowingRecording) -> list[str]:
+    return list(dict.fromkeys(name.split("/")[1] for name in recording.group("levels")))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import io
+import socket
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -46,15 +47,18 @@ class Page:
     Raises:
         MissingExtraError: The viewer is not installed.
         RecordingError: There is no recording.
-        InputError: The recording lacks what a page shows.
+        InputError: The recording lacks what a page shows, or nobody can listen at the address.
     """
 
     def __init__(self, directory: Path, host: str, port: int, ask: Ask | None) -> None:
         recording = GrowingRecording(directory)
+        if ask is None and not len(recording.data):
+            raise InputError(f"{directory} is a recording without a tick")
         if not {"robot", "tasks"} <= recording.header.keys():
             raise InputError(f"{directory} does not say what it is about; record it again")
         self._reader = FrameReader(recording)
         self._about = recording.header
+        _check_host(host)
         # It greets on the standard output, which belongs to whoever started the page.
         with contextlib.redirect_stdout(io.StringIO()):
             self._server = viser.ViserServer(host, port, label="opspace", verbose=False)
@@ -103,6 +107,9 @@ class Page:
         self._drawn = now
         self._run.show(float(times[0]), float(times[-1]))
         row = rows - 1 if self._run.follows else self._reader.row_at(self._run.time)
+        if steps := self._run.take_steps():
+            row = min(row + steps, rows - 1)
+            self._run.time = float(times[row])
         state = (row, self._run.follows)
         if state != self._shown:
             with self._server.atomic():
@@ -131,6 +138,8 @@ class Page:
         if now - self._charted >= 1.0 / CHARTS or self._run.paused:
             self._charted = now
             self._joints.content = panels.joints(frame, self._reader.joints, self._about["robot"])
+            if not self._charts:
+                self._charts = self._add_charts()
             for chart in self._charts:
                 chart.show(row)
 
@@ -152,25 +161,23 @@ class Page:
         tabs = gui.add_tab_group()
         with tabs.add_tab("Tasks"):
             self._bars = gui.add_html("")
-            if ask is not None:
+            if ask is not None and self._about["tasks"]:
                 gui.add_divider()
                 homes = _homes(self._about)
                 self._controls = StackControls(self._server, ask, self._about["tasks"], homes)
         with tabs.add_tab("Joints"):
             self._joints = gui.add_html("")
-        with tabs.add_tab("Charts"):
-            self._charts = self._add_charts()
+        self._chart_tab = tabs.add_tab("Charts")
+        self._charts: list[Chart] = []
 
     def _add_charts(self) -> list[Chart]:
+        """Make the charts, for which there must be a tick to draw."""
         reader = self._reader
-        while not reader.recording.refresh():
-            time.sleep(1.0 / PICTURES)
-        charts = [Chart(self._server, reader, "torque [N·m] over time [s]", torque_columns(reader))]
+        shown = {"torque [N·m] over time [s]": torque_columns(reader)}
         if weakest := sigma_columns(reader):
-            charts.append(
-                Chart(self._server, reader, "weakest σ of a level [1] over time [s]", weakest)
-            )
-        return charts
+            shown["weakest σ of a level [1] over time [s]"] = weakest
+        with self._chart_tab:
+            return [Chart(self._server, reader, title, names) for title, names in shown.items()]
 
     def _drag(self, task: str, place: dict[str, tuple[float, ...]]) -> None:
         if self._ask is not None:
@@ -186,6 +193,14 @@ def _robot(about: dict[str, Any]) -> Robot:
             f"robot {found.name!r} has {found.nv} joints now, the recording {len(about['joints'])}"
         )
     return found
+
+
+def _check_host(host: str) -> None:
+    # The web server would wait for ever where it cannot listen.
+    try:
+        socket.create_server((host, 0)).close()
+    except OSError as error:
+        raise InputError(f"no page can be opened at the address {host!r}: {error}") from None
 
 
 def _homes(about: dict[str, Any]) -> dict[str, float]:

@@ -9,6 +9,7 @@ import sys
 from collections.abc import Callable, Mapping
 from importlib.util import find_spec
 from pathlib import Path
+from queue import Empty, Full, Queue
 from threading import Event, Thread
 from typing import Any
 
@@ -17,25 +18,42 @@ from opspace.errors import OpspaceError, missing_extra
 STARTING = 60.0
 """Seconds that a page may take to start."""
 
+LEAVING = 5.0
+"""Seconds that it may take to go."""
+
+WAITING = 1000
+"""Messages that may wait for a page that does not listen; later ones are lost."""
+
+
+def check_installed() -> None:
+    """Refuse to begin what would need the viewer.
+
+    Raises:
+        MissingExtraError: The viewer is not installed.
+    """
+    if find_spec("viser") is None:
+        raise missing_extra("viser", "view")
+
 
 class PageProcess:
     """A page in a process of its own: nothing it does, and nothing done to it, delays a run.
 
     Args:
-        directory: Recording that it shows, with a row at least when it is waited for.
+        directory: Recording that it shows.
         host: Address to listen at.
         port: Port to listen at.
         heard: Told about every message from the page, in a thread of its own.
-
-    Raises:
-        MissingExtraError: The viewer is not installed.
+        gone: Called when the page is gone, in the same thread.
     """
 
     def __init__(
-        self, directory: Path, host: str, port: int, heard: Callable[[Mapping[str, Any]], None]
+        self,
+        directory: Path,
+        host: str,
+        port: int,
+        heard: Callable[[Mapping[str, Any]], None],
+        gone: Callable[[], None],
     ) -> None:
-        if find_spec("viser") is None:
-            raise missing_extra("viser", "view")
         command = [sys.executable, "-m", "opspace.view", str(directory)]
         self._process = subprocess.Popen(
             [*command, "--host", host, "--port", str(port)],
@@ -45,12 +63,14 @@ class PageProcess:
             # Ctrl-C is for the run; the page goes when the run lets it go.
             start_new_session=True,
         )
-        self._heard = heard
+        self._heard, self._gone = heard, gone
         self._ready, self._visited = Event(), Event()
         self._failure = ""
         self.address = ""
-        self._listening = Thread(target=self._listen, daemon=True)
-        self._listening.start()
+        self._messages: Queue[str | None] = Queue(WAITING)
+        self._threads = [Thread(target=t, daemon=True) for t in (self._listen, self._speak)]
+        for thread in self._threads:
+            thread.start()
 
     def wait(self) -> None:
         """Wait until the page can be opened.
@@ -58,9 +78,12 @@ class PageProcess:
         Raises:
             OpspaceError: It cannot be opened.
         """
-        if not self._ready.wait(STARTING) or not self.address:
+        if not self._ready.wait(STARTING):
+            self._failure = f"it did not start within {STARTING:g} s"
+        if self._failure or not self.address:
             self.close()
-            reason = self._failure or f"it did not start within {STARTING:g} s"
+            code = self._process.returncode
+            reason = self._failure or f"its process ended with exit status {code}"
             raise OpspaceError(f"the page cannot be shown: {reason}")
 
     def wait_for_visitor(self) -> None:
@@ -70,33 +93,51 @@ class PageProcess:
             pass
 
     def say(self, message: Mapping[str, Any]) -> None:
-        """Send a message; a page that is gone does not mind."""
-        assert self._process.stdin is not None
-        with contextlib.suppress(OSError, ValueError):
-            self._process.stdin.write(json.dumps(message) + "\n")
-            self._process.stdin.flush()
+        """Send a message, without waiting for the page to read it."""
+        with contextlib.suppress(Full):
+            self._messages.put_nowait(json.dumps(message))
 
     def close(self) -> None:
         """Let the page go."""
-        assert self._process.stdin is not None
-        with contextlib.suppress(OSError):
-            self._process.stdin.close()
         try:
-            self._process.wait(5.0)
-        except subprocess.TimeoutExpired:
+            self._messages.put_nowait(None)
+            self._process.wait(LEAVING)
+        except (Full, subprocess.TimeoutExpired):
             self._process.kill()
             self._process.wait()
-        self._listening.join(5.0)
+        # Whoever still writes finds nobody; whoever waits for something to write finds the end.
+        with contextlib.suppress(Empty, Full):
+            while self._messages.full():
+                self._messages.get_nowait()
+            self._messages.put_nowait(None)
+        for thread in self._threads:
+            thread.join(LEAVING)
+
+    def _speak(self) -> None:
+        """Pass messages on; what was not said when the page is gone is of no interest."""
+        assert self._process.stdin is not None
+        with contextlib.suppress(OSError, ValueError), self._process.stdin as stream:
+            while (message := self._messages.get()) is not None:
+                stream.write(message + "\n")
+                stream.flush()
 
     def _listen(self) -> None:
         assert self._process.stdout is not None
-        with self._process.stdout as messages:
-            for line in messages:
-                self._take(json.loads(line))
-        self._ready.set()
-        self._visited.set()
+        try:
+            with self._process.stdout as messages:
+                for line in messages:
+                    self._take(line)
+        finally:
+            self._ready.set()
+            self._visited.set()
+            self._gone()
 
-    def _take(self, message: Mapping[str, Any]) -> None:
+    def _take(self, line: str) -> None:
+        # A page that is killed leaves half a line.
+        try:
+            message = json.loads(line)
+        except ValueError:
+            return
         if "address" in message:
             self.address = message["address"]
             self._ready.set()

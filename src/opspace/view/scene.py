@@ -22,6 +22,9 @@ Dragged = Callable[[str, dict[str, tuple[float, ...]]], None]
 DRAG_PERIOD = 0.05
 """Seconds between two requests while a target is being dragged."""
 
+STAYS = 3.0
+"""Seconds that a handle stays where it was dragged to; then it follows the target again."""
+
 _LENGTH = 0.16
 _ARC = np.linspace(0.0, 1.5 * math.pi, 25)
 _TRAIL_POINTS = 80
@@ -136,8 +139,7 @@ class _Target:
         dragged: Dragged | None,
     ) -> None:
         self._name, self._about = name, about
-        self._goal: dict[str, tuple[float, ...]] = {}
-        self._dragging = False
+        self._dragging, self._released = False, -math.inf
         self._ball = server.scene.add_icosphere(
             f"/target/{name}", radius=0.014, color=_TARGET_COLOR, visible=False
         )
@@ -147,28 +149,36 @@ class _Target:
 
     def show(self, task: TaskFrame, robot: Robot, live: bool) -> None:
         """Put ball and handle where the task is wanted."""
-        position, rotation = self._actual(robot)
-        if "position" in self._about["led_by"] and len(task.error) in (3, 6):
-            position = position + np.nan_to_num(task.error[:3])
-        if "orientation" in self._about["led_by"] and len(task.error) in (3, 6):
-            rotation = exp_rotation(np.nan_to_num(task.error[-3:])) @ rotation
+        position, rotation = self._wanted(task, robot)
         self._ball.visible = task.present and "position" in self._about["led_by"]
         self._ball.position = position
         if self._handle is None:
             return
         self._handle.visible = task.present and live
-        if not (self._dragging or self._goal):
-            self._handle.position = position
-            self._handle.wxyz = np.array(quaternion_from_matrix(rotation))
-        elif not self._dragging and "position" not in self._about["led_by"]:
-            self._handle.position = position
+        if self._dragging or time.monotonic() < self._released + STAYS:
+            return
+        self._handle.position = position
+        self._handle.wxyz = np.array(quaternion_from_matrix(rotation))
 
-    def _actual(self, robot: Robot) -> tuple[np.ndarray, np.ndarray]:
-        frame = self._about["frame"] or robot.tool
-        if self._about["center_of_mass"]:
-            return robot.com_position(), np.eye(3)
-        id_ = robot.frame_id(frame)
-        return robot.position(id_), robot.rotation(id_)
+    def _wanted(self, task: TaskFrame, robot: Robot) -> tuple[np.ndarray, np.ndarray]:
+        """Return where the task is led, from where it is and how far it is off."""
+        about, led_by = self._about, self._about["led_by"]
+        if about["center_of_mass"]:
+            position, rotation = robot.com_position(), np.eye(3)
+        else:
+            id_ = robot.frame_id(about["frame"] or robot.tool)
+            position, rotation = robot.position(id_), robot.rotation(id_)
+        if about["offset"] is not None:
+            position = position + rotation @ np.array(about["offset"])
+        error = np.array(about["selection"]).T @ np.nan_to_num(task.error)
+        parts = error.reshape(-1, 3)
+        if about["in_tool_axes"]:
+            parts = parts @ rotation.T
+        if "position" in led_by:
+            position = position + parts[0]
+        if "orientation" in led_by:
+            rotation = exp_rotation(parts[-1]) @ rotation
+        return position, rotation
 
     def _add_handle(
         self, server: viser.ViserServer, dragged: Dragged
@@ -205,15 +215,15 @@ class _Target:
         @handle.on_drag_end
         def _(event: Any) -> None:
             del event
-            self._dragging = False
+            self._dragging, self._released = False, time.monotonic()
             self._send(handle, dragged)
 
         return handle
 
     def _send(self, handle: viser.TransformControlsHandle, dragged: Dragged) -> None:
         place = {"position": handle.position, "orientation": handle.wxyz}
-        self._goal = {what: tuple(float(x) for x in place[what]) for what in self._about["led_by"]}
-        dragged(self._name, self._goal)
+        goal = {what: tuple(float(x) for x in place[what]) for what in self._about["led_by"]}
+        dragged(self._name, goal)
 
 
 def _light(color: tuple[int, int, int]) -> np.ndarray:

@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from opspace.controller import Command, ReferenceController
-from opspace.errors import OpspaceError
+from opspace.errors import InputError, OpspaceError
 from opspace.record.format import Ended
 from opspace.record.observer import State, TickRecorder
 from opspace.sim.pacing import Pacing
 from opspace.sim.requests import FILE, Changes, RequestDesk, RunRequest
 from opspace.tasks import Task
-from opspace.view.process import PageProcess
+from opspace.view.process import PageProcess, check_installed
 
 if TYPE_CHECKING:
     from typing_extensions import Self
@@ -29,7 +29,8 @@ class Viewer:
     """Record a run and show it on a web page while it goes on.
 
     The page lives in a process of its own and reads the recording from the disk, so a run that is
-    watched does what it does without: the same ticks, the same numbers. What is asked for on the page
+    watched does what it does without: the same ticks, the same numbers. It is up when the viewer is
+    built, which takes a few seconds; no tick waits for it. What is asked for on the page
     is applied between two ticks and written to ``requests.jsonl`` beside the recording.
 
     Used as a context manager around `opspace.simulate`, or with `observe` after every tick of a loop
@@ -48,12 +49,13 @@ class Viewer:
         host: Address to listen at; the default lets nobody in from other machines.
         port: Port to listen at; the next free one is taken where it is in use.
         opened: Told about the page's address once it can be opened.
-        wait: Begin when a browser has opened the page.
+        wait: Wait for a browser to open the page before the run begins.
 
     Raises:
         MissingExtraError: The viewer is not installed.
         InputError: A task that does not fit the robot, or a speed not above 0.
         RecordingError: There is a recording already, or the directory cannot be written.
+        OpspaceError: The page cannot be shown.
     """
 
     def __init__(
@@ -72,6 +74,7 @@ class Viewer:
         opened: Callable[[str], None] = lambda address: print(f"open {address}"),
         wait: bool = False,
     ) -> None:
+        check_installed()
         directory = Path(directory)
         self._pacing = None if speed is None else Pacing(speed)
         self._recorder = TickRecorder(
@@ -84,15 +87,19 @@ class Viewer:
             overwrite=overwrite,
         )
         self._desk = RequestDesk(Changes(controller, tasks), directory / FILE, self._answer)
-        self._opened, self._wait = opened, wait
-        self._page = PageProcess(directory, host, port, self._hear)
-        self._started = False
+        self._page = PageProcess(directory, host, port, self._hear, self._go_on)
+        try:
+            self._page.wait()
+            opened(self._page.address)
+            if wait:
+                self._page.wait_for_visitor()
+        except BaseException as error:
+            self._leave(error)
+            raise
 
     def observe(self, q: np.ndarray, v: np.ndarray, command: Command) -> None:
         """Record a tick, do what was asked for, and wait until the next one is due."""
         self._recorder.observe(q, v, command)
-        if not self._started:
-            self._begin()
         self._desk.observe(q, v, command)
         if self._pacing is not None:
             self._pacing.observe(q, v, command)
@@ -126,18 +133,19 @@ class Viewer:
         error: BaseException | None,
         traceback: TracebackType | None,
     ) -> None:
+        self._leave(error)
+
+    def _leave(self, error: BaseException | None) -> None:
         if isinstance(error, KeyboardInterrupt):
             self.end("interrupted")
         elif error is not None:
             self.end("crashed", f"{type(error).__name__}: {error}")
         self.close()
 
-    def _begin(self) -> None:
-        self._page.wait()
-        self._opened(self._page.address)
-        if self._wait:
-            self._page.wait_for_visitor()
-        self._started = True
+    def _go_on(self) -> None:
+        """Let a run that was paused from a page go on when the page is gone."""
+        if self._pacing is not None:
+            self._pacing.resume()
 
     def _answer(self, request: RunRequest, reason: str) -> None:
         what = f"{request.kind} {' and '.join(request.tasks)}"
@@ -145,17 +153,17 @@ class Viewer:
 
     def _hear(self, message: Mapping[str, Any]) -> None:
         """Do what the page says; in a thread of the page's."""
-        if "request" in message:
-            try:
+        try:
+            if "request" in message:
                 self._desk.ask(RunRequest.read(message["request"]))
-            except OpspaceError as error:
-                self._page.say({"answer": "request", "reason": str(error)})
-        elif self._pacing is not None:
-            self._control(self._pacing, message)
+            elif self._pacing is not None:
+                self._control(self._pacing, message)
+        except OpspaceError as error:
+            self._page.say({"answer": "request", "reason": str(error)})
 
     @staticmethod
     def _control(pacing: Pacing, message: Mapping[str, Any]) -> None:
-        match message["control"]:
+        match message.get("control"):
             case "pause":
                 pacing.pause()
             case "resume":
@@ -163,5 +171,7 @@ class Viewer:
             case "step":
                 pacing.pause()
                 pacing.step()
-            case _:
-                pacing.speed = float(message["value"])
+            case "speed":
+                pacing.speed = message.get("value", 1.0)
+            case other:
+                raise InputError(f"a page cannot ask for {other!r}")

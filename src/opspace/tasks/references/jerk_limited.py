@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -13,10 +15,11 @@ from opspace.tasks.validation import Array, finite, finite_array
 class JerkLimited:
     """Moves to rest at the goal as fast as velocity, acceleration and jerk limits allow.
 
-    All coordinates arrive at the same time, and the path is not straight in general (Ruckig,
-    Berscheid and Kröger 2021). The motion is computed once, when the reference is built. Holds
-    the start before ``start_time`` and the goal after the motion. A motion on its way gets another
-    goal without a step by a new reference that begins with its value, velocity and acceleration.
+    All coordinates arrive at the same time where that can be planned, and the path is not straight
+    in general (Ruckig, Berscheid and Kröger 2021). The motion is computed once, when the reference
+    is built. Holds the start before ``start_time`` and the goal after the motion. A motion on its way
+    gets another goal without a step by a new reference that begins with its value, velocity and
+    acceleration.
 
     Args:
         start: (k,) first value.
@@ -47,7 +50,7 @@ class JerkLimited:
         start_velocity: ArrayLike | None = None,
         start_acceleration: ArrayLike | None = None,
     ) -> None:
-        from ruckig import InputParameter, Result, Ruckig, Trajectory  # noqa: PLC0415 - lazy
+        from ruckig import InputParameter, Trajectory  # noqa: PLC0415 - lazy
 
         self.start = finite_array(start, (None,), "JerkLimited: start")
         self.goal = finite_array(goal, self.start.shape, "JerkLimited: goal")
@@ -66,9 +69,7 @@ class JerkLimited:
         motion.max_acceleration = _limits(max_acceleration, size, "max_acceleration").tolist()
         motion.max_jerk = _limits(max_jerk, size, "max_jerk").tolist()
         self._trajectory = Trajectory(size)
-        result = Ruckig(size).calculate(motion, self._trajectory)
-        if result not in (Result.Working, Result.Finished):
-            raise InputError(f"JerkLimited: no motion within these limits ({result.name})")
+        _calculate(motion, self._trajectory, size)
         self.duration: float = self._trajectory.duration
 
     def __call__(self, t: float, /) -> Sample:
@@ -82,6 +83,25 @@ class JerkLimited:
             return Sample(self.goal, self._rest, self._rest)
         x, v, a = self._trajectory.at_time(elapsed)
         return Sample(np.array(x), np.array(v), np.array(a))
+
+
+def _calculate(motion: Any, trajectory: Any, size: int) -> None:
+    """Plan the motion; where its coordinates cannot be made to arrive together, let each be fast."""
+    from ruckig import Result, Ruckig, RuckigError, Synchronization  # noqa: PLC0415 - lazy
+
+    reason = ""
+    for synchronization in (Synchronization.Time, Synchronization.No):
+        motion.synchronization = synchronization
+        try:
+            result = Ruckig(size).calculate(motion, trajectory)
+        except (RuckigError, ValueError) as error:
+            # Some results are raised, and some have no name that Python knows.
+            reason = " ".join(str(error).split())
+            continue
+        if result in (Result.Working, Result.Finished):
+            return
+        reason = result.name
+    raise InputError(f"JerkLimited: no motion within these limits ({reason})")
 
 
 def _limits(value: ArrayLike, size: int, what: str) -> Array:
