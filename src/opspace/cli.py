@@ -395,7 +395,9 @@ def view(
         int, typer.Option(min=1, max=65535, help="Port; the next free one if it is in use.")
     ] = 8080,
     speed: Annotated[float, typer.Option(help="Seconds of the run per second.")] = 1.0,
-    duration: Annotated[float, typer.Option(help="Seconds after which the run ends.")] = 3600.0,
+    duration: Annotated[
+        float, typer.Option(help="Seconds after which the run ends; a minute takes some 100 MB.")
+    ] = 600.0,
     start: Annotated[
         bool, typer.Option("--start", help="Begin at once, not when a browser opens the page.")
     ] = False,
@@ -409,7 +411,7 @@ def view(
     from opspace.scenario import load_scenario
     from opspace.scenario.watch import next_directory, watch_scenario
 
-    if (Path(what) / HEADER).exists():
+    if Path(what).is_dir() or (Path(what) / HEADER).exists():
         _view_recording(Path(what), host, port)
         return
     loaded = load_scenario(what, overrides or ())
@@ -533,7 +535,7 @@ def export(
     from opspace.scenario.progress import counter
 
     if to is None and out is None:
-        raise InputError(f"what shall it be? --to takes {', '.join(FORMATS)}")
+        raise InputError(f"name a format with --to ({', '.join(FORMATS)}) or a file with --out")
     if to is not None and to not in FORMATS:
         raise unknown_name("format", to, FORMATS)
     loaded = load(recording)

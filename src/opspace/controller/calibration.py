@@ -141,14 +141,17 @@ def sample_postures(robot: Robot) -> Iterator[np.ndarray]:
 
 
 def _smallest_per_unit(task: Task, inverse_inertia: np.ndarray) -> np.ndarray:
-    """Smallest eigenvalue of the block of J A⁻¹ Jᵀ that each row shares a unit with, (m,)."""
+    """Smallest eigenvalue of the block of J A⁻¹ Jᵀ that each row shares a unit with, (m,).
+
+    A direction that the arm does not have in any posture is nothing that it could lose.
+    """
     units = np.array(task.units)
     result = np.zeros(task.rows)
     for unit in set(task.units):
         rows = units == unit
         sigma = np.linalg.eigvalsh(inverse_inertia[np.ix_(rows, rows)])
-        # A task of one's own may have rows that depend on each other in every posture.
-        result[rows] = max(sigma[0], 1e-6 * sigma[-1], np.finfo(float).tiny)
+        there = sigma[sigma > STRUCTURAL * sigma[-1]]
+        result[rows] = there[0] if there.size else np.finfo(float).tiny
     return result
 
 

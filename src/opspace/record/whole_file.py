@@ -28,7 +28,7 @@ def whole_file(path: Path, *, overwrite: bool = False) -> Iterator[Path]:
         raise InputError(f"{path} is a directory, not a file to write")
     if path.exists() and not overwrite:
         raise InputError(
-            f"{path} already exists; choose another file or ask for it to be overwritten"
+            f"{path} already exists; choose another file (--out) or replace it (--overwrite)"
         )
     beside = path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}")
     try:

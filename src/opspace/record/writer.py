@@ -83,8 +83,8 @@ class Recorder:
             if not self.directory.is_dir():
                 raise RecordingError(f"{self.directory} is not a directory") from error
             raise RecordingError(
-                f"{self.directory} already holds a recording; choose another directory or ask for"
-                " it to be overwritten"
+                f"{self.directory} already holds a recording; choose another directory (--out) or"
+                " replace it (--overwrite, overwrite=True)"
             ) from error
         except OSError as error:
             raise RecordingError(f"{self.directory} cannot be written: {error.strerror}") from error

@@ -21,8 +21,8 @@ from opspace.scenario.schema import Scenario
 from opspace.sim import Outcome, simulate
 from opspace.view import Viewer
 
-LONGEST = 3600.0
-"""A run that nobody ends is over after this time, s."""
+LONGEST = 600.0
+"""A run that nobody ends is over after this time, s: a recording grows by some 100 MB a minute."""
 
 
 def watch_scenario(
