@@ -161,7 +161,12 @@ def _rows(recordings: Mapping[str, Recording], columns: Sequence[str]) -> list[R
     present = [n for n in DEFAULT if all(n in r.groups for r in recordings.values())]
     if not present:
         raise InputError(f"{first.directory} has none of {', '.join(DEFAULT)}; name its columns")
-    return [row for name in present for row in _rows_of(recordings, name)]
+    # The number of a task's level is no activation, and would flatten those beside it.
+    return [
+        row._replace(columns=tuple(c for c in row.columns if not c.endswith("/level")))
+        for name in present
+        for row in _rows_of(recordings, name)
+    ]
 
 
 def _rows_of(recordings: Mapping[str, Recording], name: str) -> list[Row]:
