@@ -92,8 +92,8 @@ def test_keys_and_defaults_are_those_of_the_constructor(kind):
     entry, task = TASKS[kind]
     arguments = inspect.signature(task).parameters
     fields = dict(entry.model_fields)
-    assert set(fields) - {"type", "level"} == set(arguments) - {"name"}
-    for key in set(fields) - {"type", "level"}:
+    assert set(fields) - {"type", "level", "present"} == set(arguments) - {"name"}
+    for key in set(fields) - {"type", "level", "present"}:
         default = arguments[key].default
         if default is inspect.Parameter.empty:
             # frame of a relative task: the file may leave out what stands for the robot's tool.

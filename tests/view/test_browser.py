@@ -6,8 +6,6 @@ import math
 import os
 import shutil
 import signal
-import subprocess
-import sys
 import time
 from itertools import pairwise
 from pathlib import Path
@@ -20,6 +18,7 @@ from opspace.record import load
 from opspace.scenario.load import load_scenario
 from opspace.scenario.run import SCENARIO, run_scenario
 from opspace.sim.requests import FILE
+from tests.view.command import started
 
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser"))), None)
 pytestmark = [
@@ -58,11 +57,7 @@ def run(tmp_path):
     (tmp_path / "story.yaml").write_text(STORY)
     out = tmp_path / "run"
     words = ["view", str(tmp_path / "story.yaml"), "--out", str(out), "--port", "18480"]
-    process = subprocess.Popen(
-        [sys.executable, "-c", "from opspace.cli import main; main()", *words],
-        stdout=subprocess.PIPE,
-        text=True,
-    )
+    process = started(*words)
     line = process.stdout.readline()
     address = next(word for word in line.split() if word.startswith("http"))
     yield out, address, process
@@ -191,12 +186,7 @@ def load_rows(out):
 
 def test_a_recording_on_a_small_screen(tmp_path, chromium):
     run_scenario(load_scenario("singularity"), tmp_path / "run")
-    process = subprocess.Popen(
-        [sys.executable, "-c", "from opspace.cli import main; main()", "view"]
-        + [str(tmp_path / "run"), "--port", "18580"],
-        stdout=subprocess.PIPE,
-        text=True,
-    )
+    process = started("view", str(tmp_path / "run"), "--port", "18580")
     try:
         address = next(w for w in process.stdout.readline().split() if w.startswith("http"))
         page = opened(chromium, address, 800, 700)

@@ -24,6 +24,7 @@ from opspace.sim import simulate
 from opspace.sim.requests import FILE, RunRequest
 from opspace.view import Viewer
 from tests.scenario.short import HOLD, short
+from tests.view.command import started
 
 pytestmark = pytest.mark.xdist_group("viewer")
 
@@ -198,17 +199,9 @@ def test_a_recording_without_a_tick_is_refused(tmp_path, capsys):
     assert "without a tick" in capsys.readouterr().err
 
 
-def command(*words, **options):
+def command(*words):
     environment = {k: v for k, v in os.environ.items() if k not in ("DISPLAY", "WAYLAND_DISPLAY")}
-    code = "from opspace.cli import main; main()"
-    return subprocess.Popen(
-        [sys.executable, "-c", code, *words],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        env=environment,
-        **options,
-    )
+    return started(*words, stderr=subprocess.PIPE, env=environment)
 
 
 def lines_until(process, word):
