@@ -47,7 +47,8 @@ test-package: $(INSTALLED)
 	$(PYTHON) -m venv $(PACKAGE)
 	$(BIN)/uv pip install --quiet --python $(PACKAGE)/bin/python --constraints constraints.txt "opspace[all,docs,test] @ $$(ls results/package/*.whl)"
 	tar -xzf results/package/*.tar.gz -C results/package
-	cd results/package/opspace-*/ && mv src source && $(CURDIR)/$(PACKAGE)/bin/python -m pytest -n 2
+	cd results/package/opspace-*/ && $(CURDIR)/$(PACKAGE)/bin/python -c "import opspace; assert 'site-packages' in opspace.__file__, opspace.__file__"
+	cd results/package/opspace-*/ && $(CURDIR)/$(PACKAGE)/bin/python -m pytest -n 2
 
 test-slow: $(INSTALLED)
 	$(BIN)/python -m pytest -m slow
