@@ -62,8 +62,8 @@ class Chart:
 
     def _data(self, row: int) -> tuple[np.ndarray, ...]:
         history = self._reader.history(row, SECONDS, POINTS, self._columns)
-        # What is not there is nan, which this minimum passes over.
-        lines = np.fmin.reduceat(history[:, 1:], self._starts, axis=1)
+        # What is not there is nan: this minimum passes over it, and a line of nan would hide all others.
+        lines = np.nan_to_num(np.fmin.reduceat(history[:, 1:], self._starts, axis=1))
         return (history[:, 0].copy(), *lines.T.copy())
 
 

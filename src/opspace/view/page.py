@@ -175,7 +175,7 @@ class Page:
         reader = self._reader
         shown = {"torque [N·m] over time [s]": torque_columns(reader)}
         if weakest := sigma_columns(reader):
-            shown["weakest σ of a level [1] over time [s]"] = weakest
+            shown["weakest σ of a level [1], 0 without one, over time [s]"] = weakest
         with self._chart_tab:
             return [Chart(self._server, reader, title, names) for title, names in shown.items()]
 
