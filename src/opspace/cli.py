@@ -535,7 +535,7 @@ def export(
     from opspace.scenario.progress import counter
 
     if to is None and out is None:
-        raise InputError(f"name a format with --to ({', '.join(FORMATS)}) or a file with --out")
+        raise InputError(f"name a format or a file: --to takes {', '.join(FORMATS)}")
     if to is not None and to not in FORMATS:
         raise unknown_name("format", to, FORMATS)
     loaded = load(recording)
