@@ -37,7 +37,7 @@ def test_a_run_takes_its_real_time_and_not_less():
 def test_without_pacing_nothing_waits():
     start = time.perf_counter()
     ticks(Pacing(math.inf), 1000, dt=10.0)
-    assert time.perf_counter() - start < 1000.0
+    assert time.perf_counter() - start < 60.0
 
 
 def test_a_paused_run_does_the_steps_asked_for_and_goes_on():

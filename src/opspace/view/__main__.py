@@ -10,13 +10,12 @@ import contextlib
 import json
 import os
 import sys
-import time
 from pathlib import Path
 from threading import Lock, Thread
 from typing import Any
 
 from opspace.view.controls import Ask
-from opspace.view.page import PICTURES, Page
+from opspace.view.page import Page
 
 
 def main() -> None:
@@ -39,9 +38,7 @@ def main() -> None:
     pages.append(page)
     page.on_visit(lambda: say({"visited": True}))
     say({"address": page.address})
-    while True:
-        page.show()
-        time.sleep(1.0 / PICTURES)
+    page.serve()
 
 
 def _speaker() -> Ask:
