@@ -11,11 +11,13 @@ from typing import Any
 import numpy as np
 
 from opspace.controller.compiled.batch import Remembered, ticks
+from opspace.controller.compiled.compile_apart import Calls, compile_apart
 from opspace.controller.compiled.layout import OPTION_SIZE, Tick, tick_handle
 from opspace.controller.compiled.memory import Sizes, make_tick
 from opspace.controller.compiled.report import spectrum
 from opspace.controller.compiled.tick import tick
 from opspace.law.compiled.handle import Handle
+from opspace.law.compiled.jit import is_kept
 from opspace.law.compiled.space import Space
 from opspace.robots.dynamics import ALIGNED, RigidBodies, make_dynamics
 from opspace.robots.motion_axes import MotionAxes
@@ -33,14 +35,7 @@ def compiled_tick() -> float:
     Returns:
         How long it took, s.
     """
-    if tick.signatures:
-        return 0.0
-
-    def call() -> None:
-        tick(0.0, tick_handle(*_smallest(_axes())))
-        spectrum(np.ones((1, 1)), np.zeros(OPTION_SIZE))
-
-    return _announced("the control tick", tick, call)
+    return 0.0 if tick.signatures else ready("the control tick", first_tick)
 
 
 def tick_entry() -> Callable[[float, Handle], int]:
@@ -58,35 +53,53 @@ def compiled_batch() -> float:
     Returns:
         How long it took, s.
     """
-    if ticks.signatures:
-        return 0.0
-
-    def call() -> None:
-        bodies = _one_body()
-        state = np.zeros((1, 1))
-        axes = RigidModel(bodies, {}, ()).motion_axes(
-            make_dynamics(bodies), np.zeros(1), np.zeros(1)
-        )
-        before = Remembered(np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros((0, 4)))
-        start = Handle("Remembered", before._asdict())
-        k = tick_handle(*_smallest(axes))
-        ticks(0.0, k, start, state, state, np.ones((1, 0)), 0, 1, state.copy())
-
-    return _announced("the control tick for many states", ticks, call)
+    return 0.0 if ticks.signatures else ready("the control tick for many states", first_batch)
 
 
-def _announced(what: str, compiled: Any, call: Callable[[], None]) -> float:
-    """Call compiled code for the first time, and say so when it takes long."""
+def first_tick() -> list[tuple[Any, tuple[Any, ...]]]:
+    """Return what is called to have the tick and its report compiled."""
+    return [
+        (tick, (0.0, tick_handle(*_smallest(_axes())))),
+        (spectrum, (np.ones((1, 1)), np.zeros(OPTION_SIZE))),
+    ]
+
+
+def first_batch() -> list[tuple[Any, tuple[Any, ...]]]:
+    """Return what is called to have the tick for many states compiled."""
+    bodies = _one_body()
+    state = np.zeros((1, 1))
+    axes = RigidModel(bodies, {}, ()).motion_axes(make_dynamics(bodies), np.zeros(1), np.zeros(1))
+    before = Remembered(np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros((0, 4)))
+    start = Handle("Remembered", before._asdict())
+    k = tick_handle(*_smallest(axes))
+    return [(ticks, (0.0, k, start, state, state, np.ones((1, 0)), 0, 1, state.copy()))]
+
+
+def ready(what: str, calls: Calls) -> float:
+    """Call compiled functions for the first time, and say so when it takes long.
+
+    Args:
+        what: What they are together, for the announcement.
+        calls: Gives them with their arguments; can be imported by its name.
+
+    Returns:
+        How long it took, s.
+    """
     start = time.perf_counter()
     announcement = Timer(PATIENCE, _announce, (what,))
     announcement.daemon = True
     announcement.start()
     try:
-        call()
+        found = calls()
+        new = not all(is_kept(compiled, arguments) for compiled, arguments in found)
+        if new:
+            compile_apart(calls)
+        for compiled, arguments in found:
+            compiled(*arguments)
     finally:
         announcement.cancel()
     seconds = time.perf_counter() - start
-    if sum(compiled.stats.cache_misses.values()):
+    if new:
         log.warning("compiled %s in %.0f s; it is kept for the next start", what, seconds)
     return seconds
 

@@ -63,3 +63,11 @@ def jit(function: Callable[..., Any], *, counted: bool = False, nogil: bool = Fa
         source_stamp=STAMP,
     )
     return compiled
+
+
+def is_kept(compiled: Any, arguments: tuple[Any, ...]) -> bool:
+    """Whether the disk holds a function, compiled for arguments of these types on this processor."""
+    cache = compiled._cache
+    types = tuple(numba.typeof(argument) for argument in arguments)
+    key = cache._index_key(types, compiled.targetctx.codegen())
+    return key in cache._cache_file._load_index()

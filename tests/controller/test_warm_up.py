@@ -1,0 +1,72 @@
+"""The first start and every later one run the same compiled code."""
+
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from opspace.record import load
+
+SMALL = """
+import numpy as np
+from opspace.law.compiled.jit import jit
+
+def total(x):
+    return x.sum()
+
+total = jit(total)
+
+def calls():
+    return [(total, (np.ones(3),))]
+"""
+START = """
+import sys
+import small
+from opspace.controller.compiled.warm_up import ready
+sys.executable = {python!r}
+ready("a sum", small.calls)
+stats = small.total.stats
+print(sum(stats.cache_hits.values()), sum(stats.cache_misses.values()))
+"""
+RUN = "from opspace.cli import main; main()"
+
+
+@pytest.fixture
+def empty(tmp_path):
+    """Run a program that finds nothing compiled in its first call, what the first left in the next."""
+    environment = os.environ | {
+        "NUMBA_CACHE_DIR": str(tmp_path / "kept"),
+        "PYTHONPATH": str(tmp_path),
+    }
+
+    def start(*words):
+        return subprocess.run(
+            [sys.executable, *words], env=environment, capture_output=True, text=True, check=True
+        )
+
+    return start
+
+
+def test_another_process_compiles_at_the_first_start(empty, tmp_path):
+    (tmp_path / "small.py").write_text(SMALL)
+    program = START.format(python=sys.executable)
+    first, second = (empty("-c", program) for _ in range(2))
+    assert first.stdout.split() == second.stdout.split() == ["1", "0"]
+    assert "compiled a sum" in first.stderr
+    assert "compiled" not in second.stderr
+
+
+@pytest.mark.parametrize("python", ["", "/opt/somewhere/robot-studio", "/nowhere/python3"])
+def test_without_another_process_it_compiles_by_itself(empty, tmp_path, python):
+    (tmp_path / "small.py").write_text(SMALL)
+    assert empty("-c", START.format(python=python)).stdout.split() == ["0", "1"]
+
+
+@pytest.mark.slow
+def test_the_first_run_ever_gives_the_numbers_of_every_later_one(empty, tmp_path):
+    for name in ("first", "second"):
+        empty("-c", RUN, "run", "singularity", "--out", str(tmp_path / name))
+    first, second = (load(tmp_path / name).data for name in ("first", "second"))
+    np.testing.assert_array_equal(first, second)
