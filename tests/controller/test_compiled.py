@@ -270,6 +270,40 @@ def test_what_is_changed_while_it_runs():
         before = after
 
 
+class Late(PositionTask):
+    """Has an activation from some moment on, without an assignment."""
+
+    begun = False
+
+    @property
+    def activation(self):
+        return (lambda robot, t: 0.5) if self.begun else None
+
+
+def test_a_class_may_decide_anew_whether_its_tasks_have_an_activation():
+    twins = Twins(ROBOTS[-1], lambda: [Late(), OrientationTask(), PostureTask()])
+    q, v = state(twins.robot)
+    assert twins.step(0.0, q, v).tasks["position"].activation == 1.0
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Late, "begun", True)
+        assert twins.step(DT, q, v).tasks["position"].activation == 0.5
+    assert twins.step(2 * DT, q, v).tasks["position"].activation == 1.0
+
+
+def test_an_answer_stays_what_it_is_whatever_is_done_to_another():
+    twins = Twins(ROBOTS[-1], lambda: [PositionTask(), OrientationTask(), PostureTask()])
+    q, v = state(twins.robot)
+    first = twins.step(0.0, q, v)
+    tau, error = first.tau.copy(), first.tasks["position"].error.copy()
+    first.tasks["posture"].error[:] = np.nan
+    second = twins.step(DT, q + 0.01, v)
+    second.tau[:] = np.nan
+    second.tasks["position"].error[:] = np.nan
+    np.testing.assert_array_equal(first.tau, tau)
+    np.testing.assert_array_equal(first.tasks["position"].error, error)
+    assert np.isfinite(twins.step(2 * DT, q, v).tau).all()
+
+
 def test_a_rotation_past_half_a_turn_keeps_its_way():
     twins = Twins(ROBOTS[0], lambda: [OrientationTask()])
     q, v = twins.robot.q_reference.copy(), np.zeros(6)

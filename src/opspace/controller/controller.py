@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
+from math import isfinite
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -26,7 +27,9 @@ from opspace.controller.compiled.layout import (
 from opspace.controller.compiled.plan import Plan
 from opspace.controller.compiled.report import CompiledReport
 from opspace.controller.compiled.warm_up import compiled_batch, compiled_tick, tick_entry
+from opspace.controller.disturbance import DisturbanceObserver
 from opspace.controller.tick import ReferenceController
+from opspace.controller.timing import Timing
 from opspace.errors import InputError
 from opspace.law.compiled.handle import Handle
 from opspace.law.compiled.profiles import PROFILE_CODE
@@ -35,11 +38,25 @@ from opspace.robots.dynamics import make_dynamics
 from opspace.robots.motion_axes import MotionAxes
 from opspace.robots.rigid_model import RigidModel
 from opspace.stack import Member
+from opspace.tasks.base import CHANGES
 from opspace.tasks.validation import finite, numbers
 
 STATUSES = tuple(Status(bits) for bits in range(2048))
 NEW = tuple.__new__
 TIME_JUMP, FAULT = int(Status.TIME_JUMP), int(Status.FAULT)
+
+_Fixed: TypeAlias = tuple[
+    AdapterBase,
+    Callable[[ArrayLike, ArrayLike], None],
+    Callable[[], None] | None,
+    Timing | None,
+    Callable[[float], tuple[Member, ...]],
+    DisturbanceObserver | None,
+    Callable[[float, Handle], int],
+]
+_LaidOut: TypeAlias = tuple[
+    tuple[Member, ...], Plan, Handle, Callable[[], np.ndarray], Callable[[], bytes]
+]
 
 
 class Controller(ReferenceController):
@@ -57,61 +74,65 @@ class Controller(ReferenceController):
     _plan: Plan | None = None
     _bodies: RigidModel | None = None
     _batch: Batch | None = None
-    _tick: Callable[[float, Handle], int]
+    # What every tick needs, in one piece: reading an attribute takes as long as a line of local names.
+    _fixed: _Fixed | None = None
+    _laid_out: _LaidOut | None = None
 
     def step(self, t: float, q: ArrayLike, v: ArrayLike) -> Command:
         """Compute the torque for one state; see `ReferenceController.step`."""
-        axes = self._axes
-        if axes is None:
+        fixed = self._fixed
+        if fixed is None:
             self.warm_up()
-            axes = self._axes
-            if axes is None:
+            fixed = self._fixed
+            if fixed is None:
                 return super().step(t, q, v)
-        if type(t) is not float or not math.isfinite(t):
+        robot, place, catch_up, watch, begin_tick, observer, tick = fixed
+        if type(t) is not float or not isfinite(t):
             t = finite(t, "time")
-        robot: AdapterBase = self.robot  # pyright: ignore[reportAssignmentType]
         try:
-            robot.place(q, v)
+            place(q, v)
         except (TypeError, ValueError):
             q, v = numbers(q, "q"), numbers(v, "v")
             robot.check_state(q, v)
-            robot.place(q, v)
-        if self._bodies is None:
-            robot.catch_up()
+            place(q, v)
+        if catch_up is not None:
+            catch_up()
         timing = 0  # a number: the operators of flags cost as much as all of Python here
-        if self._timing is not None:
+        if watch is not None:
             robot.check_state(robot.q, robot.v)
-            timing = int(self._timing.check(t, robot.q, robot.v))
+            timing = int(watch.check(t, robot.q, robot.v))
             if timing & TIME_JUMP and self._holds:
                 return self._hold(t, STATUSES[timing])
-        members = self.stack.begin_tick(t)
-        plan = self._plan
-        if plan is None or members is not plan.members:
+        members = begin_tick(t)
+        laid_out = self._laid_out
+        if laid_out is None or members is not laid_out[0]:
             if not Plan.fits(members):
                 robot.update(robot.q, robot.v)
                 return self._answer(t, members, STATUSES[timing])
-            plan = self._plan = self._planned(members, axes)
-        plan.refresh(robot, t)
-        answer = self._tick(t, plan.handle) if self._observer is None else self._learn(t, plan)
+            laid_out = self._lay_out(members)
+        _, plan, handle, torque, memory = laid_out
+        if plan.moving or CHANGES.last is not plan.seen:
+            plan.refresh(robot, t)
+        answer = tick(t, handle) if observer is None else self._learn(t, observer)
         if answer < 0:
             if answer == STATE_NOT_FINITE:
                 robot.check_state(robot.q, robot.v)
             return self._hold(t, STATUSES[timing | FAULT])
-        found = plan.memory.copy()
         status = STATUSES[answer % SOLVE | timing]
-        # Half the time of the named tuple's own constructor.
+        # Bytes are copied in half the time of an array; the tuple's own constructor takes twice this.
         command = NEW(
-            Command, (t, found[: plan.n], status, answer // SOLVE, CompiledReport(plan, found))
+            Command, (t, torque(), status, answer // SOLVE, CompiledReport(plan, memory()))
         )
         return command if self._handover is None else self._handed_over(command)
 
-    def _learn(self, t: float, plan: Plan) -> int:
+    def _learn(self, t: float, observer: DisturbanceObserver) -> int:
         """Tick with joint limits that learn what the model does not explain."""
-        observer, v = self._observer, self.robot.v
-        assert observer is not None
+        assert self._fixed is not None
+        assert self._plan is not None
+        plan, v = self._plan, self.robot.v
         observer.observe(t, v)
         plan.disturb(observer.acceleration)
-        answer = self._tick(t, plan.handle)
+        answer = self._fixed[-1](t, plan.handle)
         if answer >= 0:
             observer.remember(t, v, plan.tick.joint_acceleration)
         return answer
@@ -152,7 +173,7 @@ class Controller(ReferenceController):
         """
         if t is None:
             t = self.stack.time or 0.0
-        if not math.isfinite(t):
+        if not isfinite(t):
             raise InputError(f"time must be finite, got {t}")
         if threads is not None and threads < 1:
             raise InputError(f"a batch needs at least one thread, got {threads}")
@@ -175,11 +196,21 @@ class Controller(ReferenceController):
         Returns:
             How long it took, s.
         """
-        self._axes = self._axes or self._compiled_robot()
         if self._axes is None:
+            self._axes = self._compiled_robot()
+        robot = self.robot
+        if self._axes is None or not isinstance(robot, AdapterBase):
             return 0.0
         seconds = compiled_tick()
-        self._tick = tick_entry()
+        self._fixed = (
+            robot,
+            robot.place,
+            robot.catch_up if self._bodies is None else None,
+            self._timing,
+            self.stack.begin_tick,
+            self._observer,
+            tick_entry(),
+        )
         return seconds
 
     def _compiled_robot(self) -> MotionAxes | None:
@@ -204,6 +235,13 @@ class Controller(ReferenceController):
             )
         compiled_batch()
         return Batch(robot, self._bodies, members, self._planned, threads)
+
+    def _lay_out(self, members: tuple[Member, ...]) -> _LaidOut:
+        assert self._axes is not None
+        plan = self._plan = self._planned(members, self._axes)
+        memory = plan.memory
+        laid_out = self._laid_out = members, plan, plan.handle, plan.tick.tau.copy, memory.tobytes
+        return laid_out
 
     def _planned(self, members: tuple[Member, ...], axes: MotionAxes) -> Plan:
         plan = Plan(

@@ -34,6 +34,17 @@ class TaskTerms:
     error: Array
 
 
+class Changes:
+    """Tells a tick that some task may have changed: ``last`` is another object after every change."""
+
+    def __init__(self) -> None:
+        self.last = object()
+
+
+CHANGES = Changes()
+"""Of all tasks there are: most ticks find that nothing has changed, and look at no task."""
+
+
 class Task(ABC):
     """Base class of all tasks.
 
@@ -70,6 +81,13 @@ class Task(ABC):
         self.rows = rows
         self.units = units
         self._set_gains(kp, kv, max_speed)
+
+    if not TYPE_CHECKING:  # a type checker would take any name for an attribute
+
+        def __setattr__(self, name: str, value: object) -> None:
+            """Set an attribute, then say so: a tick in between looks at the task once more."""
+            super().__setattr__(name, value)
+            CHANGES.last = object()
 
     @abstractmethod
     def bind(self, robot: Robot) -> None:

@@ -67,30 +67,6 @@ def kind_of(task: Task) -> int:
     return OWN
 
 
-def refresh(tasks: list[Packed], robot: AdapterBase, t: float) -> None:
-    """Bring the arrays up to date with the tasks at time ``t`` [s].
-
-    Args:
-        tasks: The tasks.
-        robot: The robot at the present state.
-        t: Time, s.
-
-    Raises:
-        InputError: A reference or a task of the user's own gave unusable numbers.
-    """
-    for packed in tasks:
-        task = packed.task
-        # Most ticks find everything as it was; an activation may be assigned at any time.
-        if (
-            packed.moving
-            or task.activation is not None
-            or task._target is not packed.target
-            or task._held is not packed.held
-            or task._gains is not packed.gains
-        ):
-            packed.refresh(robot, t)
-
-
 class Packed:
     """One task in the arrays of a plan.
 
@@ -156,7 +132,9 @@ class Packed:
             or task._gains is not self.gains
         ):
             self._pack(robot, t)
-        self.moving = self.own_kind or self._timed or self._own_activation
+        # A class may decide anew at every tick whether its tasks have an activation.
+        decides = type(task).activation is not None
+        self.moving = self.own_kind or self._timed or self._own_activation or decides
 
     def remember(self, before: Packed) -> None:
         """Go on from the same task in the plan before: which way round a rotation went."""

@@ -22,13 +22,14 @@ from opspace.controller.compiled.layout import (
     tick_handle,
 )
 from opspace.controller.compiled.memory import Sizes, make_tick
-from opspace.controller.compiled.packing import Packed, refresh
+from opspace.controller.compiled.packing import Packed
 from opspace.controller.options import Scales
 from opspace.law.compiled.profiles import PROFILE_CODE
 from opspace.robots.base import AdapterBase
 from opspace.robots.motion_axes import MotionAxes
 from opspace.stack import Member, Variable
 from opspace.tasks import JointLimits
+from opspace.tasks.base import CHANGES
 from opspace.tasks.joint_limits import RETURN_SPEED
 
 MOST = 62
@@ -80,6 +81,8 @@ class Plan:
             corners=_most_corners(len(self.variables), room),
         )
         self.tick, space, self.memory = make_tick(self.size, axes, torque_limit, options)
+        self.seen: object = None
+        self.moving: list[Packed] = []
         self.packed = self._pack(scales)
         self._pack_variables()
         self._pack_slots()
@@ -99,6 +102,8 @@ class Plan:
     def refresh(self, robot: AdapterBase, t: float) -> None:
         """Bring targets, gains, and what users compute themselves up to date.
 
+        Nothing is to be done while `seen` is the last change there was and nothing is `moving`.
+
         Args:
             robot: The robot at the present state.
             t: Time, s.
@@ -106,7 +111,15 @@ class Plan:
         Raises:
             InputError: A reference, activation or task gave unusable numbers.
         """
-        refresh(self.packed, robot, t)
+        last = CHANGES.last  # before the look at the tasks: what changes meanwhile is seen next
+        if last is self.seen:
+            for packed in self.moving:
+                packed.refresh(robot, t)
+            return
+        for packed in self.packed:
+            packed.refresh(robot, t)
+        self.moving = [packed for packed in self.packed if packed.moving]
+        self.seen = last
 
     def disturb(self, acceleration: np.ndarray) -> None:
         """Tell the joint limits what comes on top of the commanded accelerations, (n,) rad/s²."""

@@ -25,12 +25,12 @@ class CompiledReport:
 
     Args:
         plan: The plan of the tick.
-        memory: Copy of the block that the tick wrote.
+        memory: The bytes of the block that the tick wrote.
     """
 
     __slots__ = ("_levels", "_memory", "_parts", "_plan", "_tasks")
 
-    def __init__(self, plan: Plan, memory: np.ndarray) -> None:
+    def __init__(self, plan: Plan, memory: bytes) -> None:
         self._plan = plan
         self._memory = memory
         self._parts: dict[str, np.ndarray] | None = None
@@ -68,7 +68,7 @@ class CompiledReport:
                 shares[i][level] = shares[i].get(level, 0.0) + share
         status: dict[str, TaskStatus] = {}
         for packed, levels, h in zip(plan.packed, shares, found["h"].tolist(), strict=True):
-            error = found["error"][packed.rows]
+            error = found["error"][packed.rows].copy()
             norm = float(np.sqrt(error @ error))
             status[packed.task.name] = TaskStatus(h, tuple(sorted(levels.items())), error, norm)
         return status
@@ -89,7 +89,7 @@ class CompiledReport:
     def _found(self) -> dict[str, np.ndarray]:
         if self._parts is None:
             block = Block(0)
-            block.memory = self._memory
+            block.memory = np.frombuffer(self._memory)
             self._parts = reported(self._plan.size, block)
         return self._parts
 
