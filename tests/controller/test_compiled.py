@@ -277,7 +277,7 @@ class Late(PositionTask):
 
     @property
     def activation(self):
-        return (lambda robot, t: 0.5) if self.begun else None
+        return (lambda robot, t: 0.7) if self.begun else None
 
 
 def test_a_class_may_decide_anew_whether_its_tasks_have_an_activation():
@@ -286,7 +286,7 @@ def test_a_class_may_decide_anew_whether_its_tasks_have_an_activation():
     assert twins.step(0.0, q, v).tasks["position"].activation == 1.0
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(Late, "begun", True)
-        assert twins.step(DT, q, v).tasks["position"].activation == 0.5
+        assert twins.step(DT, q, v).tasks["position"].activation == 0.7
     assert twins.step(2 * DT, q, v).tasks["position"].activation == 1.0
 
 
