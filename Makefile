@@ -52,6 +52,7 @@ test-package: $(INSTALLED)
 
 test-slow: $(INSTALLED)
 	$(BIN)/python -m pytest -m slow
+	OPSPACE_CAMPAIGN=1 $(BIN)/python -m pytest -n 2 tests/law -k continuous
 
 test-browser: $(INSTALLED)
 	$(BIN)/python -m pytest -m browser

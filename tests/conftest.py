@@ -22,3 +22,11 @@ settings.register_profile(
     "opspace", deadline=None, suppress_health_check=[HealthCheck.too_slow], print_blob=True
 )
 settings.load_profile("opspace")
+
+
+def pytest_configure(config):
+    """Compile once, before several workers would do it at the same time."""
+    from opspace.controller.compiled.warm_up import compiled_tick
+
+    if config.getoption("numprocesses", None) and not hasattr(config, "workerinput"):
+        compiled_tick()

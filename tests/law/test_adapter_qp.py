@@ -3,10 +3,11 @@
 import daqp
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from opspace.law import TaskSet, intermediate_values, task_torque
+from tests.budget import examples
 from tests.law.stacks import inertia
 
 N = 7
@@ -76,7 +77,7 @@ CONTROLLERS = {
 }
 
 
-@settings(max_examples=300)
+@examples(60)
 @given(st.integers(0, 2**32 - 1), st.sampled_from(sorted(CONTROLLERS)))
 def test_a_hard_switched_qp_becomes_continuous(seed, kind):
     rng = np.random.default_rng(seed)

@@ -9,6 +9,7 @@ from opspace.errors import InputError
 from opspace.law import Buffer, SigmaBuffer, TaskSet, task_torque
 from opspace.law.hierarchy import start
 from opspace.law.singularity import solve_level_smoothly
+from tests.budget import examples
 from tests.law.stacks import inertia, stacks
 
 MANY = settings(max_examples=300)
@@ -59,7 +60,7 @@ def largest_steps(torque, start, end):
     return coarse[worst], np.max(fine)
 
 
-@MANY
+@examples(80)
 @given(SEEDS, st.sampled_from([0.01, 0.02]))
 def test_torque_is_continuous_where_sigma_crosses_an_edge(seed, edge):
     sweep = Sweep(seed)
@@ -69,7 +70,7 @@ def test_torque_is_continuous_where_sigma_crosses_an_edge(seed, edge):
     assert fine <= 0.4 * coarse + 1e-10
 
 
-@MANY
+@examples(80)
 @given(SEEDS, st.floats(0.012, 0.018))
 def test_torque_is_continuous_where_two_sigmas_cross_in_the_buffer(seed, at):
     """The level below uses two of seven joints' motions, so giving back the wrong one would show."""

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from opspace.law import TaskSet, intermediate_values, task_torque
 from opspace.law.hierarchy import hard_law, levels_of, whiten
 from opspace.law.recursion import law_recursion
+from tests.budget import examples
 from tests.law.stacks import inertia, scale_of, stacks
 
 MANY = settings(max_examples=300)
@@ -110,7 +111,7 @@ def test_the_adapter_around_the_law_gives_the_laws_own_values(stack, blending):
         np.testing.assert_allclose(a, b, rtol=0, atol=1e-8 * scale)
 
 
-@MANY
+@examples(100)
 @given(stacks(), st.sampled_from(["idv", "chain"]), st.data())
 def test_torque_is_continuous_along_paths_of_all_activations(stack, blending, data):
     """No step is larger than the activations' own steps times the widest gap of hard torques.

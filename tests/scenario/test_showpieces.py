@@ -17,9 +17,6 @@ FENCE = {"showpiece-panda": "panda_joint1", "showpiece": "joint1"}
 
 NAMES = ("showpiece-panda", pytest.param("showpiece", marks=pytest.mark.slow))
 
-# One worker runs them, once.
-pytestmark = pytest.mark.xdist_group("showpieces")
-
 
 @pytest.fixture(scope="module", params=NAMES)
 def shown(request, tmp_path_factory):

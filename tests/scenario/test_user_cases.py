@@ -7,8 +7,6 @@ import pytest
 
 from tests.scenario.command import run_by_command
 
-pytestmark = pytest.mark.xdist_group("user-cases")
-
 
 @pytest.fixture(scope="module")
 def recording(tmp_path_factory):

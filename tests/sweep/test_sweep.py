@@ -153,7 +153,7 @@ def test_a_process_that_dies_or_hangs_is_replaced(monkeypatch):
 
     monkeypatch.setattr(pool, "_start", deadly)
     plan = SweepPlan(BASE, [GAIN], runs=4)
-    found = {row["index"]: row for row in pool.run_here(plan, range(4), 1, timeout=12.0)}
+    found = {row["index"]: row for row in pool.run_here(plan, range(4), 1, timeout=6.0)}
     assert {i: row["ended"] for i, row in found.items()} == {
         0: "completed",
         1: "died",

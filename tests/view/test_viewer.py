@@ -26,8 +26,6 @@ from opspace.view import Viewer
 from tests.scenario.short import HOLD, short
 from tests.view.command import started
 
-pytestmark = pytest.mark.xdist_group("viewer")
-
 DURATION = 0.6
 GUEST = {"type": "joint", "joint": "joint3", "level": 1, "present": False}
 
