@@ -12,6 +12,7 @@ import time
 
 import numpy as np
 
+from opspace import JointTask
 from opspace.bench import SCENES
 
 PERIOD = 1e-3
@@ -61,8 +62,37 @@ def measure(ticks, *, paced, collector):
     }
 
 
+def changes(count):
+    """Time the ticks at which a transition begins or ends, µs: they lay out the stack anew."""
+    scene = SCENES["panda"]
+    controller = scene.controller()
+    q, v = scene.states(controller.robot)
+    guest = JointTask("panda_joint4", name="guest")
+    controller.stack.prepare(guest)
+    found = []
+    for k in range(100 * count):
+        if k % 100 == 0:
+            present = guest in list(controller.stack)
+            ask = controller.stack.remove if present else controller.stack.insert
+            ask(guest, **({} if present else {"level": 0.5}), duration=0.05)
+        start = time.perf_counter_ns()
+        controller.step(1e-3 * k, q[k % len(q)], v[k % len(q)])
+        if k > 100 and k % 50 < 2:
+            found.append(time.perf_counter_ns() - start)
+    begun = np.array(found) * 1e-3
+    laid_out = begun[begun > 100.0]
+    p50, p99 = np.percentile(laid_out, (50, 99))
+    return {
+        "transitions": count,
+        "laid_out": len(laid_out),
+        "p50": round(float(p50)),
+        "p99": round(float(p99)),
+        "max": round(float(begun.max())),
+    }
+
+
 def main():
-    """Measure with the collector on, frozen and off."""
+    """Measure with the collector on, frozen and off; then the ticks at which something changes."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--ticks", type=int, default=1_000_000)
     parser.add_argument("--paced", action="store_true", help="one tick a millisecond")
@@ -72,6 +102,7 @@ def main():
         os.sched_setaffinity(0, {options.core})
     for collector in ("on", "frozen", "off"):
         print(json.dumps(measure(options.ticks, paced=options.paced, collector=collector)))
+    print(json.dumps(changes(min(options.ticks, 500))))
 
 
 if __name__ == "__main__":

@@ -9,6 +9,7 @@ from opspace.law import SigmaBuffer, TaskSet, blended_torque, corners
 from opspace.law.activation import PROFILES, Profile, Ramp
 from opspace.law.compiled.algebra import cholesky, singular_values
 from opspace.law.compiled.corners import sort_corners
+from opspace.law.compiled.inertia import inertia_handle, make_inertia
 from opspace.law.compiled.profiles import PROFILE_CODE, profile, ramp
 from opspace.law.compiled.space import make_space, space_handle
 from opspace.law.compiled.walk import begin, pass_on, slot_bit, walk
@@ -47,7 +48,8 @@ def compiled_torque(L, tasks, blend, buffer):
     )
     weights = np.array([corner.weight for corner in blend])
     count = sort_corners(masks, weights, len(blend))
-    space = make_space(n, len(ranks) + 1, row)
+    inertia = inertia_handle(make_inertia(np.arange(n) - 1))
+    space = make_space(n, len(ranks) + 1, row, inertia)
     s = space_handle(space)
     levels = len(ranks) + 1
     begin(n, levels, s)

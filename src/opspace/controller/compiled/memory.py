@@ -102,12 +102,12 @@ def make_tick(
     block = Block(reported_size(size))
     kept = reported(size, block)
     limit = np.array(torque_limit)  # one that may be written, like all the others
-    space = make_space(size.n, size.levels + 1, size.rows + size.limits)._replace(
+    inertia = inertia_handle(make_inertia(_before(axes)))
+    space = make_space(size.n, size.levels + 1, size.rows + size.limits, inertia)._replace(
         top=kept.pop("top"),
         chosen=kept.pop("chosen"),
         width=kept.pop("width"),
         kept=kept.pop("kept"),
-        inertia=inertia_handle(make_inertia(_before(axes))),
         limit=limit,
     )
     integers = np.int64

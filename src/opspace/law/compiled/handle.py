@@ -10,7 +10,9 @@ address: arrays are read from it where they are used, and are never counted. Who
 
 from __future__ import annotations
 
+import ctypes
 from collections.abc import Mapping
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -64,24 +66,44 @@ class Handle:
         fields: Arrays, contiguous and writable, and other handles.
     """
 
-    __slots__ = ("_fields", "_numba_type_", "_words", "address")
+    __slots__ = ("_fields", "_kind", "_words", "address")
 
     def __init__(self, kind: str, fields: Mapping[str, np.ndarray | Handle]) -> None:
+        self._kind = kind
         self._fields = dict(fields)
-        found: list[tuple[str, Any]] = []
         words: list[int] = []
         for name, field in fields.items():
             if isinstance(field, Handle):
-                found.append((name, field._numba_type_))
                 words.append(field.address)
                 continue
-            if not (field.flags.c_contiguous and field.flags.aligned and field.flags.writeable):
-                raise ValueError(f"{kind}.{name} must be contiguous and writable")
-            found.append((name, types.Array(from_dtype(field.dtype), field.ndim, "C")))
-            words += [field.ctypes.data, *field.shape]
-        self._numba_type_ = HandleType(kind, tuple(found))
+            if not field.flags.carray:
+                raise ValueError(f"{kind}.{name} must be contiguous, aligned and writable")
+            words += [_address(field), *field.shape]
         self._words = np.array(words, np.uintp)
-        self.address = int(self._words.ctypes.data)
+        self.address = _address(self._words)
+
+    @property
+    def _numba_type_(self) -> HandleType:
+        """The type, for numba: found when it is asked for, which takes longer than all the rest."""
+        fields = self._fields.items()
+        return HandleType(
+            self._kind,
+            tuple(
+                (n, f._numba_type_ if isinstance(f, Handle) else _array_type(f.dtype, f.ndim))
+                for n, f in fields
+            ),
+        )
+
+
+def _address(array: np.ndarray) -> int:
+    """Where an array begins, in a quarter of the time that its own attributes take to tell."""
+    buffer: Any = array
+    return ctypes.addressof(ctypes.c_char.from_buffer(buffer)) if array.size else 0
+
+
+@cache
+def _array_type(dtype: np.dtype, dimensions: int) -> types.Array:
+    return types.Array(from_dtype(dtype), dimensions, "C")
 
 
 @typeof_impl.register(Handle)

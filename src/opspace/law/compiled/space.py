@@ -7,7 +7,6 @@ from typing import NamedTuple
 import numpy as np
 
 from opspace.law.compiled.handle import Handle
-from opspace.law.compiled.inertia import inertia_handle, make_inertia
 
 
 class Space(NamedTuple):
@@ -91,7 +90,7 @@ class Space(NamedTuple):
     got: np.ndarray
 
 
-def make_space(n: int, depth: int, rows: int) -> Space:
+def make_space(n: int, depth: int, rows: int, inertia: Handle) -> Space:
     """Make the memory for ``n`` joints, ``depth`` levels and ``rows`` rows in a level."""
     D, R, most = depth + 1, max(rows, 1), max(rows, n, 1)
     integers = np.int64
@@ -125,7 +124,7 @@ def make_space(n: int, depth: int, rows: int) -> Space:
         kept=np.zeros((R, n)),
         first_kept=np.zeros(D, integers),
         motors=np.zeros(1, integers),
-        inertia=inertia_handle(make_inertia(np.arange(n) - 1)),
+        inertia=inertia,
         start=np.zeros(n),
         limit=np.full(n, np.inf),
         torque=np.zeros((D, n)),
