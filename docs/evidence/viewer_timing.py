@@ -16,11 +16,17 @@ import numpy as np
 from playwright.sync_api import sync_playwright
 
 import opspace as osc
-from opspace.sim.requests import FILE, Changes, RequestPlayer
+from opspace.sim.requests import FILE, Changes, RequestPlayer, RunRequest
 
 SECONDS = 12.0
 WATCHED = "results/timing/watched"
-PHASES = ("page, no browser", "browser opens and shows", "100 requests at once", "tab closed")
+PHASES = (
+    "page, no browser",
+    "browser opens and shows",
+    "100 clicks",
+    "tab closed",
+    "100 requests at the same moment",
+)
 BUSY = "import numpy as np\nx = np.zeros(4_000_000)\nwhile True: x += 1.0"
 FLAGS = ("--no-sandbox", "--disable-gpu", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
 CLICKS = """async () => { const buttons = [...document.querySelectorAll('button')];
@@ -132,6 +138,12 @@ def watched():
     def wait():
         command = ["taskset", "-c", "1", sys.executable, __file__, viewer._page.address]
         marks.extend(json.loads(subprocess.run(command, stdout=PIPE, check=True).stdout))
+        for k in range(100):
+            kind = ("insert", "remove")[k % 2]
+            level = 1.0 if kind == "insert" else None
+            viewer.ask(RunRequest(kind, tasks=("elbow",), level=level, duration=0.1))
+        time.sleep(1.0)
+        marks.append(time.perf_counter())
         os.kill(os.getpid(), signal.SIGINT)
 
     Thread(target=wait, daemon=True).start()
@@ -151,13 +163,11 @@ def main() -> None:
     times, edges = watched()
     phases |= {name: times[a:b] for name, (a, b) in zip(PHASES, pairwise(edges), strict=True)}
     during = slice(*edges[2:4])
-    phases["the same requests, no page"] = alone(len(times), Path(WATCHED) / FILE)[during]
+    phases["the same clicks, no page"] = alone(len(times), Path(WATCHED) / FILE)[during]
     with subprocess.Popen(["taskset", "-c", "1", sys.executable, "-c", BUSY]) as busy:
         found = alone(len(times), Path(WATCHED) / FILE)[during]
         busy.kill()
-    phases["the same requests, no page, the other core busy"] = found
-    done = len((Path(WATCHED) / FILE).read_text().splitlines())
-    print(f"{done} of 100 requests found something to do")
+    phases["the same clicks, no page, the other core busy"] = found
     print("| phase | ticks | p50 [µs] | p99 [µs] | max [µs] |\n| --- | ---: | ---: | ---: | ---: |")
     for name, found in phases.items():
         micro = 1e6 * found

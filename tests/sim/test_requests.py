@@ -161,6 +161,18 @@ def test_the_same_requests_at_the_same_ticks_give_the_same_run(tmp_path):
     assert np.abs(quiet - seen).max() > 0.1
 
 
+def test_a_hundred_requests_at_once_are_dealt_with_one_after_each_tick(tmp_path):
+    log = tmp_path / "requests.jsonl"
+    live = Run()
+    desk = RequestDesk(live.changes, log)
+    asked = [RunRequest("gain", ("position",), kp=100.0 + k, duration=0.1) for k in range(100)]
+    live.go(0.15, Asking(desk, {20: asked}), desk)
+    desk.close()
+    done = [json.loads(line) for line in log.read_text().splitlines()]
+    assert [entry["kp"] for entry in done] == [request.kp for request in asked]
+    np.testing.assert_allclose(np.diff([entry["at"] for entry in done]), 1e-3, atol=1e-9)
+
+
 def test_a_dragged_target_and_a_gain_make_no_step():
     # Half the tick halves the largest change of torque; a step would stay as it is.
     steps = []

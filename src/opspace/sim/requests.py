@@ -244,13 +244,16 @@ class RequestDesk:
         self._answer = answer
 
     def ask(self, request: RunRequest) -> None:
-        """Put a request on the desk, from any thread; it is dealt with after the running tick."""
+        """Put a request on the desk, from any thread; each is dealt with after a tick of its own."""
         self._waiting.append(request)
 
     def observe(self, q: np.ndarray, v: np.ndarray, command: Command) -> None:
-        """Deal with what lies on the desk."""
+        """Deal with the request that has waited longest.
+
+        One takes some tenth of a millisecond; a hundred in one tick would delay the next one.
+        """
         del q, v
-        while self._waiting:
+        if self._waiting:
             self._deal(self._waiting.popleft(), command.t)
         self._changes.follow(command.t)
 
