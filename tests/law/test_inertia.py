@@ -12,7 +12,7 @@ from opspace.law.compiled.inertia import (
     torque_of,
     unit_row,
     whiten,
-    whiten_row,
+    whiten_rows,
     whitened_of,
 )
 
@@ -62,9 +62,11 @@ def test_the_factor_is_one_and_has_the_zeros_of_the_tree(seed):
     found[:] = x
     whiten(f, found)
     np.testing.assert_allclose(U @ found, x, rtol=0, atol=1e-9)
-    found[:] = x * moves[joint]
-    whiten_row(f, joint, found)
-    np.testing.assert_allclose(found @ U.T, x * moves[joint], rtol=0, atol=1e-9)
+    rows = rng.normal(size=(4, n)) * moves[joint]
+    many = rows.copy()
+    whiten_rows(f, joint, 1, 3, many)
+    np.testing.assert_allclose(many[1:3] @ U.T, rows[1:3], rtol=0, atol=1e-9)
+    np.testing.assert_array_equal(many[[0, 3]], rows[[0, 3]])
     unit_row(f, joint, 2.0, found)
     np.testing.assert_allclose(found @ U.T, 2.0 * np.eye(n)[joint], rtol=0, atol=1e-9)
 

@@ -36,7 +36,7 @@ from opspace.law.compiled.inertia import (
     torque_of,
     unit_row,
     whiten,
-    whiten_row,
+    whiten_rows,
     whitened_of,
 )
 from opspace.law.compiled.jit import jit
@@ -176,16 +176,19 @@ def whiten_task(k, i, n):
     """Whiten the rows of task i."""
     J, Jw, fw, weight = k.J, k.Jw, k.fw, k.row_weight
     first = k.kind[i, FIRST_ROW]
-    for row in range(first, first + k.kind[i, ROWS]):
+    end = first + k.kind[i, ROWS]
+    of_frame = k.kind[i, KIND] == MOTION and k.kind[i, SOURCE] == WORLD
+    for row in range(first, end):
         if k.kind[i, KIND] == JOINTS:
             unit_row(k.inertia, k.coordinate[row], weight[row], Jw[row])
-        else:
-            for a in range(n):
-                Jw[row, a] = weight[row] * J[row, a]
-            if k.kind[i, KIND] == MOTION and k.kind[i, SOURCE] == WORLD:
-                whiten_row(k.inertia, k.kind[i, JOINT], Jw[row])
-            else:
-                whiten(k.inertia, Jw[row])
+            continue
+        for a in range(n):
+            Jw[row, a] = weight[row] * J[row, a]
+        if not of_frame:
+            whiten(k.inertia, Jw[row])
+    if of_frame:
+        whiten_rows(k.inertia, k.kind[i, JOINT], first, end, Jw)
+    for row in range(first, end):
         fw[row] = weight[row] * (k.wanted[row] - k.drift[row])
         if k.option[TASK_BIAS] != 0.0:
             for a in range(n):

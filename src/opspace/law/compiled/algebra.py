@@ -14,7 +14,7 @@ EPSILON = 2e-15
 
 @jit
 def cholesky(A, n, shift, L):
-    """Factor A − shift·I = L Lᵀ into the lower triangle of L.
+    """Factor A − shift·I = L Lᵀ into the lower triangle of L, its diagonal inverted.
 
     Returns:
         Whether it is positive definite, that is whether every eigenvalue of A is above the shift;
@@ -30,30 +30,30 @@ def cholesky(A, n, shift, L):
             if i == j:
                 if not s > 0.0:
                     return False
-                L[i, i] = math.sqrt(s)
+                L[i, i] = 1.0 / math.sqrt(s)
             else:
-                L[i, j] = s / L[j, j]
+                L[i, j] = s * L[j, j]
     return True
 
 
 @jit
 def solve_lower(L, n, x):
-    """Overwrite x with L⁻¹ x."""
+    """Overwrite x with L⁻¹ x, for L as `cholesky` leaves it."""
     for i in range(n):
         s = x[i]
         for k in range(i):
             s -= L[i, k] * x[k]
-        x[i] = s / L[i, i]
+        x[i] = s * L[i, i]
 
 
 @jit
 def solve_lower_transposed(L, n, x):
-    """Overwrite x with L⁻ᵀ x."""
+    """Overwrite x with L⁻ᵀ x, for L as `cholesky` leaves it."""
     for i in range(n - 1, -1, -1):
         s = x[i]
         for k in range(i + 1, n):
             s -= L[k, i] * x[k]
-        x[i] = s / L[i, i]
+        x[i] = s * L[i, i]
 
 
 @jit

@@ -66,11 +66,12 @@ class Handle:
         fields: Arrays, contiguous and writable, and other handles.
     """
 
-    __slots__ = ("_fields", "_kind", "_words", "address")
+    __slots__ = ("_fields", "_kind", "_type", "_words", "address")
 
     def __init__(self, kind: str, fields: Mapping[str, np.ndarray | Handle]) -> None:
         self._kind = kind
         self._fields = dict(fields)
+        self._type: HandleType | None = None
         words: list[int] = []
         for name, field in fields.items():
             if isinstance(field, Handle):
@@ -84,21 +85,24 @@ class Handle:
 
     @property
     def _numba_type_(self) -> HandleType:
-        """The type, for numba: found when it is asked for, which takes longer than all the rest."""
-        fields = self._fields.items()
-        return HandleType(
-            self._kind,
-            tuple(
-                (n, f._numba_type_ if isinstance(f, Handle) else _array_type(f.dtype, f.ndim))
-                for n, f in fields
-            ),
-        )
+        """The type, for numba: made when it is asked for, which takes longer than all the rest."""
+        found = self._type
+        if found is None:
+            fields = tuple((name, _type_of(field)) for name, field in self._fields.items())
+            found = self._type = HandleType(self._kind, fields)
+        return found
 
 
 def _address(array: np.ndarray) -> int:
     """Where an array begins, in a quarter of the time that its own attributes take to tell."""
     buffer: Any = array
     return ctypes.addressof(ctypes.c_char.from_buffer(buffer)) if array.size else 0
+
+
+def _type_of(field: np.ndarray | Handle) -> Any:
+    if isinstance(field, Handle):
+        return field._numba_type_
+    return _array_type(field.dtype, field.ndim)
 
 
 @cache

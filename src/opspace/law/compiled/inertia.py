@@ -21,11 +21,13 @@ class Inertia(NamedTuple):
 
     Attributes:
         U: (n, n) upper triangular, M = U Uᵀ.
+        inverse: (n,) one over its diagonal: a division takes as long as ten products.
         before: (n,) the coordinate before each one on the way to the base, −1 for none.
         end: (n,) the coordinate after the last one that each one carries.
     """
 
     U: np.ndarray
+    inverse: np.ndarray
     before: np.ndarray
     end: np.ndarray
 
@@ -40,7 +42,7 @@ def make_inertia(before: np.ndarray) -> Inertia:
             carried[before[a]] += carried[a]
     if not np.array_equal(end - np.arange(n), carried):
         return make_inertia(np.arange(n) - 1)
-    return Inertia(np.zeros((n, n)), np.array(before, np.int64), end)
+    return Inertia(np.zeros((n, n)), np.zeros(n), np.array(before, np.int64), end)
 
 
 def inertia_handle(inertia: Inertia) -> Handle:
@@ -55,7 +57,7 @@ def factor(M, f):
     Returns:
         Whether M is positive definite; otherwise U is not usable.
     """
-    U, before, end = f.U, f.before, f.end
+    U, inverse, before, end = f.U, f.inverse, f.before, f.end
     for a in range(U.shape[0] - 1, -1, -1):
         s = M[a, a]
         for k in range(a + 1, end[a]):
@@ -64,6 +66,7 @@ def factor(M, f):
             return False
         U[a, a] = math.sqrt(s)
         scale = 1.0 / U[a, a]
+        inverse[a] = scale
         b = before[a]
         while b >= 0:
             s = M[b, a]
@@ -75,44 +78,53 @@ def factor(M, f):
 
 
 @jit
-def whiten_row(f, last, x):
-    """Overwrite a row of a Jacobian that moves coordinate ``last`` and those before with x U⁻ᵀ."""
-    U, before = f.U, f.before
+def whiten_rows(f, last, first, end, X):
+    """Overwrite rows of Jacobians that move coordinate ``last`` and those before with X U⁻ᵀ."""
+    U, inverse, before = f.U, f.inverse, f.before
     a = last
     while a >= 0:
-        s = x[a]
-        for k in range(a + 1, last + 1):
-            s -= U[a, k] * x[k]
-        x[a] = s / U[a, a]
+        # Row by row inside, so that one need not wait for the other.
+        for i in range(first, end):
+            s = X[i, a]
+            for k in range(a + 1, last + 1):
+                s -= U[a, k] * X[i, k]
+            X[i, a] = s * inverse[a]
         a = before[a]
 
 
 @jit
 def whiten(f, x):
     """Overwrite any row of a Jacobian with x U⁻ᵀ, and a torque with the whitened one, U⁻¹ x."""
-    U, end = f.U, f.end
+    U, inverse, end = f.U, f.inverse, f.end
     for a in range(U.shape[0] - 1, -1, -1):
         s = x[a]
         for k in range(a + 1, end[a]):
             s -= U[a, k] * x[k]
-        x[a] = s / U[a, a]
+        x[a] = s * inverse[a]
 
 
 @jit
 def unit_row(f, a, weight, x):
     """Fill x with the whitened row of a joint: weight · e_aᵀ U⁻ᵀ."""
+    U, inverse, before = f.U, f.inverse, f.before
     for b in range(x.shape[0]):
         x[b] = 0.0
-    x[a] = weight
-    whiten_row(f, a, x)
+    x[a] = weight * inverse[a]
+    b = before[a]
+    while b >= 0:
+        s = 0.0
+        for k in range(b + 1, a + 1):
+            s -= U[b, k] * x[k]
+        x[b] = s * inverse[b]
+        b = before[b]
 
 
 @jit
 def acceleration_of(f, x):
     """Overwrite a whitened torque with the acceleration U⁻ᵀ x that it causes."""
-    U, end = f.U, f.end
+    U, inverse, end = f.U, f.inverse, f.end
     for a in range(U.shape[0]):
-        x[a] /= U[a, a]
+        x[a] *= inverse[a]
         for k in range(a + 1, end[a]):
             x[k] -= U[a, k] * x[a]
 

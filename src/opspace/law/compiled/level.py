@@ -154,7 +154,11 @@ def _solve_wide(d, m, n, used, last, bound, s):
     for i in range(m, r):
         x[i] = 0.0
     apply_reflectors(B, m, r, scale, x)
-    _step(n, r, s.Z[d], x, s.u[d], s.u[d + 1])
+    if r == n:  # the basis is the identity
+        for a in range(n):
+            s.u[d + 1, a] = s.u[d, a] + x[a]
+    else:
+        _step(n, r, s.Z[d], x, s.u[d], s.u[d + 1])
     if not last:
         for j in range(m, r):
             _complement(d, m, n, r, j, x, s, s.Z[d + 1, j - m])
@@ -265,14 +269,18 @@ def _complement(d, m, n, used, j, x, s, vector):
         x[b] = 0.0
     x[j] = 1.0
     apply_reflectors(s.B, m, used, s.scale, x)
-    _combine(n, used, s.Z[d], s.column, x, vector)
+    _combine(n, used, s.free[d], s.Z[d], s.column, x, vector)
 
 
 @jit
-def _combine(n, used, Z, column, x, vector):
-    """Σ x_c times the vectors of Z that are used."""
+def _combine(n, used, r, Z, column, x, vector):
+    """Σ x_c times the vectors of Z that are used, of r in all."""
     for a in range(n):
         vector[a] = 0.0
+    if r == n:  # the basis is the identity
+        for c in range(used):
+            vector[column[c]] = x[c]
+        return
     for c in range(used):
         factor, basis = x[c], Z[column[c]]
         for a in range(n):
@@ -365,7 +373,7 @@ def _directions(d, m, n, used, rank, s):
             x[b] = Y[i, b] if b < rank else 0.0
         if m < r:
             apply_reflectors(B, m, used, scale, x)
-        _combine(n, used, Z, column, x, V[i])
+        _combine(n, used, r, Z, column, x, V[i])
     for j in range(rank, used):
         _complement(d, m, n, used, j, x, s, V[j])
     for j in range(used, r):
