@@ -80,6 +80,8 @@ def solve_level(d, count, n, J, last, buffer, s):
         _singular_tall(count, r, s)
         rank = r
     else:
+        if count == 1 and _solve_row(d, n, used, last, bound, s):
+            return 1
         if _solve_wide(d, count, n, used, last, bound, s):
             return 1
         _singular_wide(count, s)
@@ -134,6 +136,43 @@ def _bound(count, n, J, buffer, rows):
         for a in range(n):
             size += J[rows[i], a] * J[rows[i], a]
     return REGULAR * size
+
+
+@jit
+def _solve_row(d, n, used, last, bound, s):
+    """One row: a step along it; the others are turned by the reflector that makes it the first."""
+    row, column, Z, left, along = s.B[0], s.column, s.Z[d], s.Z[d + 1], s.y
+    size = 0.0
+    for c in range(used):
+        size += row[c] * row[c]
+    if not size > bound:
+        return False
+    for a in range(n):
+        along[a] = 0.0
+    for c in range(used):
+        factor, vector = row[c], Z[column[c]]
+        for a in range(n):
+            along[a] += factor * vector[a]
+    factor = s.residual[0] / size
+    for a in range(n):
+        s.u[d + 1, a] = s.u[d, a] + factor * along[a]
+    r = s.free[d]
+    s.free[d + 1] = r - 1
+    if last:
+        return True
+    norm = math.sqrt(size)
+    first, pivot = Z[column[0]], row[0]
+    alpha = -norm if pivot > 0.0 else norm
+    scale = 1.0 / (norm * (norm + abs(pivot)))
+    for a in range(n):
+        along[a] = scale * (along[a] - alpha * first[a])
+    for c in range(1, used):
+        factor, vector, turned = row[c], Z[column[c]], left[c - 1]
+        for a in range(n):
+            turned[a] = vector[a] - factor * along[a]
+    for c in range(used, r):
+        _copy(n, Z[column[c]], left[c - 1])
+    return True
 
 
 @jit
