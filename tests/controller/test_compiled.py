@@ -290,6 +290,57 @@ def test_a_class_may_decide_anew_whether_its_tasks_have_an_activation():
     assert twins.step(2 * DT, q, v).tasks["position"].activation == 1.0
 
 
+class Silent(PositionTask):
+    """Tells nobody what is assigned to it."""
+
+    def __setattr__(self, name, value):
+        object.__setattr__(self, name, value)
+
+
+def test_a_task_that_tells_nobody_of_its_changes_is_followed():
+    twins = Twins(ROBOTS[-1], lambda: [Silent(), PostureTask()])
+    q, v = state(twins.robot)
+    before = [twins.step(k * DT, q, v).tau for k in range(3)][-1]
+    for stack in twins.stacks:
+        next(iter(stack)).target = [0.3, 0.2, 0.5]
+    assert not np.array_equal(before, twins.step(3 * DT, q, v).tau)
+
+
+def test_what_a_reference_assigns_to_another_task_is_followed_in_the_same_tick():
+    twins = Twins(ROBOTS[-1], lambda: [OrientationTask(), PositionTask(), PostureTask()])
+    q, v = state(twins.robot)
+    twins.step(0.0, q, v)
+
+    def leading(stack):
+        orientation, position, _ = stack
+
+        def reference(t):
+            if t > 2.5 * DT:
+                position.target = [0.3, 0.2, 0.5]
+            return Sample(np.eye(3), np.zeros(3), np.zeros(3))
+
+        orientation.target = reference
+
+    for stack in twins.stacks:
+        leading(stack)
+    for k in range(1, 6):
+        twins.step(k * DT, q, v)
+
+
+def test_gains_and_rates_cannot_be_changed_in_place():
+    task = PositionTask(kp=[10.0, 20.0, 30.0])
+    for found in (task.kp, task.kv, task.target_velocity, task.target_acceleration):
+        with pytest.raises(ValueError, match="read-only"):
+            found[...] = 1.0
+
+
+def test_robot_and_stack_of_a_controller_stay():
+    controller = Controller(load_robot("puma560"), Stack([PositionTask()]))
+    for name in ("robot", "stack"):
+        with pytest.raises(AttributeError):
+            setattr(controller, name, getattr(controller, name))
+
+
 def test_an_answer_stays_what_it_is_whatever_is_done_to_another():
     twins = Twins(ROBOTS[-1], lambda: [PositionTask(), OrientationTask(), PostureTask()])
     q, v = state(twins.robot)

@@ -58,6 +58,24 @@ def test_another_process_compiles_at_the_first_start(empty, tmp_path):
     assert "compiled" not in second.stderr
 
 
+def test_where_it_is_kept_may_be_set_in_the_program_and_paths_may_be_anything(empty, tmp_path):
+    (tmp_path / "small.py").write_text(SMALL)
+    own = f"""
+import pathlib, sys, numba
+sys.path.append(pathlib.Path("somewhere"))
+numba.config.CACHE_DIR = {str(tmp_path / "own")!r}
+"""
+    assert empty("-c", own + START.format(python=sys.executable)).stdout.split() == ["1", "0"]
+
+
+def test_what_the_other_process_says_is_of_no_importance(empty, tmp_path):
+    noise = "import sys; sys.stderr.buffer.write(bytes([0xE9])); sys.stderr.buffer.flush()\n"
+    (tmp_path / "small.py").write_text(noise + SMALL)
+    program = "import io, sys; sys.stderr = io.TextIOWrapper(io.BytesIO())\n"
+    program += START.format(python=sys.executable)
+    assert empty("-c", program).stdout.split() == ["1", "0"]
+
+
 @pytest.mark.parametrize("python", ["", "/opt/somewhere/robot-studio", "/nowhere/python3"])
 def test_without_another_process_it_compiles_by_itself(empty, tmp_path, python):
     (tmp_path / "small.py").write_text(SMALL)

@@ -1,5 +1,7 @@
 """The compiled law against the readable one, on random stacks."""
 
+import math
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -128,3 +130,17 @@ def test_the_certificate_is_exact(seed, m, shift):
     bound = smallest * (1.0 + shift)
     if abs(shift) > 1e-6:
         assert cholesky(B @ B.T, m, bound, np.zeros((m, m))) == (bound < smallest)
+
+
+@given(st.integers(0, 2**32 - 1), st.floats(-6.0, -0.3), st.integers(0, 3))
+def test_just_above_a_small_buffer_the_last_level_keeps_its_digits(seed, decades, more):
+    rng = np.random.default_rng(seed)
+    n, upper = 5, 10.0**decades
+    U, V = (np.linalg.qr(rng.normal(size=(k, k)))[0] for k in (n + more, n))
+    J = U[:, :n] * [1.0, 1.0, 1.0, 1.0, math.sqrt(2.0 * upper)] @ V.T
+    tasks = [TaskSet(J, rng.normal(size=n + more), 0, 1.0, "a", 1.0)]
+    blend = corners([1.0], "idv")
+    expected, _ = blended_torque(np.eye(n), tasks, blend, SigmaBuffer(upper / 5.0, upper))
+    buffer = np.array([1.0, upper / 5.0, upper, PROFILE_CODE["quintic"]])
+    found = compiled_torque(np.eye(n), tasks, blend, buffer)
+    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-9 * np.linalg.norm(expected))

@@ -165,12 +165,36 @@ def test_a_hundred_requests_at_once_are_dealt_with_one_after_each_tick(tmp_path)
     log = tmp_path / "requests.jsonl"
     live = Run()
     desk = RequestDesk(live.changes, log)
-    asked = [RunRequest("gain", ("position",), kp=100.0 + k, duration=0.1) for k in range(100)]
+    asked = [RunRequest("move", ("posture",), level=2.0 + k % 2, duration=0.01) for k in range(100)]
     live.go(0.15, Asking(desk, {20: asked}), desk)
     desk.close()
     done = [json.loads(line) for line in log.read_text().splitlines()]
-    assert [entry["kp"] for entry in done] == [request.kp for request in asked]
+    assert [entry["level"] for entry in done] == [request.level for request in asked]
     np.testing.assert_allclose(np.diff([entry["at"] for entry in done]), 1e-3, atol=1e-9)
+
+
+def test_of_many_gains_and_places_that_wait_only_the_last_counts(tmp_path):
+    log, answers = tmp_path / "requests.jsonl", []
+    live = Run()
+    desk = RequestDesk(live.changes, log, lambda request, reason: answers.append(reason))
+    asked = [RunRequest("gain", ("position",), kp=100.0 + k, duration=0.1) for k in range(40)]
+    asked.insert(20, RunRequest("gain", ("posture",), kp=7.0, duration=0.1))
+    asked.append(RunRequest("remove", ("posture",), duration=0.1))
+    live.go(0.05, Asking(desk, {20: asked}), desk)
+    desk.close()
+    done = [json.loads(line) for line in log.read_text().splitlines()]
+    assert [entry.get("kp") for entry in done] == [7.0, 139.0, None]
+    assert answers == [""] * 42
+
+
+def test_what_waits_when_the_run_ends_is_answered():
+    answers = []
+    live = Run()
+    desk = RequestDesk(live.changes, None, lambda request, reason: answers.append(reason))
+    asked = [RunRequest("move", ("posture",), level=5.0 + k, duration=0.1) for k in range(3)]
+    live.go(0.02, Asking(desk, {19: asked}), desk)
+    desk.close()
+    assert answers == ["", "the run has ended", "the run has ended"]
 
 
 def test_a_dragged_target_and_a_gain_make_no_step():

@@ -111,8 +111,7 @@ class ReferenceController:
         check_drivable(robot)
         if stack.limits is not None:
             Profile(stack.limits.profile)
-        self.robot = robot
-        self.stack = stack
+        self._robot, self._stack = robot, stack
         self.bias = bias
         self.singularity = singularity
         self.damping = float(damping)
@@ -175,6 +174,16 @@ class ReferenceController:
         if handover.done:
             self._handover = None
         return command._replace(tau=tau, status=command.status | Status.HANDOVER)
+
+    @property
+    def robot(self) -> Robot:
+        """The robot that it was built with."""
+        return self._robot
+
+    @property
+    def stack(self) -> Stack:
+        """The stack that it was built with; tasks come and go in it, it stays."""
+        return self._stack
 
     @property
     def blending(self) -> str:

@@ -124,6 +124,15 @@ class RunRequest:
         except TypeError as error:
             raise InputError(f"this is no request: {error}") from None
 
+    def replaces(self, other: RunRequest) -> bool:
+        """Whether nothing of another request is left when this one is done."""
+        if self.kind not in ("lead", "gain") or (self.kind, self.tasks) != (
+            other.kind,
+            other.tasks,
+        ):
+            return False
+        return self.plain().keys() >= other.plain().keys()
+
     def plain(self) -> dict[str, Any]:
         """Return the request in JSON's own types, without what is not given."""
         values = {f.name: getattr(self, f.name) for f in fields(self)}
@@ -250,15 +259,22 @@ class RequestDesk:
     def observe(self, q: np.ndarray, v: np.ndarray, command: Command) -> None:
         """Deal with the request that has waited longest.
 
-        One takes some tenth of a millisecond; a hundred in one tick would delay the next one.
+        One takes some tenth of a millisecond; a hundred in one tick would delay the next one. A
+        place to be led to, or a gain, that another one of the same kind waits to replace is skipped.
         """
         del q, v
-        if self._waiting:
-            self._deal(self._waiting.popleft(), command.t)
+        while self._waiting:
+            request = self._waiting.popleft()
+            if not any(later.replaces(request) for later in tuple(self._waiting)):
+                self._deal(request, command.t)
+                break
+            self._answer(request, "")
         self._changes.follow(command.t)
 
     def close(self) -> None:
-        """Close the log."""
+        """Answer what still waits, and close the log."""
+        while self._waiting:
+            self._answer(self._waiting.popleft(), "the run has ended")
         if self._log is not None:
             self._log.close()
 

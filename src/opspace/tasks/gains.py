@@ -92,7 +92,7 @@ def make_gains(
             not above zero, or that meets kp > 0 with kv = 0.
     """
     stiffness = _gain(kp, "kp", rows, owner)
-    damping = 2.0 * np.sqrt(stiffness) if kv is None else _gain(kv, "kv", rows, owner)
+    damping = _gain(2.0 * np.sqrt(stiffness) if kv is None else kv, "kv", rows, owner)
     if stiffness.ndim and damping.ndim and stiffness.shape != damping.shape:
         raise InputError(
             f"task {owner!r}: kp has {stiffness.size} numbers but kv has {damping.size}"

@@ -245,5 +245,7 @@ class TrackingTask(Task):
     def _vector(self, value: ArrayLike | None, what: str) -> Array:
         """Return a velocity or acceleration (k,), zero for None; any length before k is known."""
         if value is None:
-            return np.zeros(self._motion_size or 0)
+            rest = np.zeros(self._motion_size or 0)
+            rest.flags.writeable = False
+            return rest
         return finite_array(value, (self._motion_size,), what)

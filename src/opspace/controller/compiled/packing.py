@@ -132,9 +132,10 @@ class Packed:
             or task._gains is not self.gains
         ):
             self._pack(robot, t)
-        # A class may decide anew at every tick whether its tasks have an activation.
-        decides = type(task).activation is not None
-        self.moving = self.own_kind or self._timed or self._own_activation or decides
+        # A class may decide anew at every tick what its tasks have, or tell nobody of changes.
+        kind = type(task)
+        silent = kind.activation is not None or kind.__setattr__ is not Task.__setattr__
+        self.moving = self.own_kind or self._timed or self._own_activation or silent
 
     def remember(self, before: Packed) -> None:
         """Go on from the same task in the plan before: which way round a rotation went."""

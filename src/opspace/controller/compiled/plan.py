@@ -82,7 +82,7 @@ class Plan:
         )
         self.tick, space, self.memory = make_tick(self.size, axes, torque_limit, options)
         self.seen: object = None
-        self.moving: list[Packed] = []
+        self.moving = False
         self.packed = self._pack(scales)
         self._pack_variables()
         self._pack_slots()
@@ -102,7 +102,7 @@ class Plan:
     def refresh(self, robot: AdapterBase, t: float) -> None:
         """Bring targets, gains, and what users compute themselves up to date.
 
-        Nothing is to be done while `seen` is the last change there was and nothing is `moving`.
+        Nothing is to be done while ``seen`` is the last change there was and nothing is ``moving``.
 
         Args:
             robot: The robot at the present state.
@@ -112,13 +112,9 @@ class Plan:
             InputError: A reference, activation or task gave unusable numbers.
         """
         last = CHANGES.last  # before the look at the tasks: what changes meanwhile is seen next
-        if last is self.seen:
-            for packed in self.moving:
-                packed.refresh(robot, t)
-            return
         for packed in self.packed:
             packed.refresh(robot, t)
-        self.moving = [packed for packed in self.packed if packed.moving]
+        self.moving = any(packed.moving for packed in self.packed)
         self.seen = last
 
     def disturb(self, acceleration: np.ndarray) -> None:

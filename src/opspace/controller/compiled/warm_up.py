@@ -105,7 +105,7 @@ def ready(what: str, calls: Calls) -> float:
 
 
 def _announce(what: str) -> None:
-    log.warning("compiling %s, once after each installation: about half a minute", what)
+    log.warning("compiling %s, once after each installation: half a minute to two", what)
 
 
 def _axes() -> MotionAxes:

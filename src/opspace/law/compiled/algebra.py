@@ -106,6 +106,28 @@ def apply_reflectors(B, m, r, scale, x):
 
 
 @jit
+def apply_reflectors_transposed(B, m, r, scale, x):
+    """Overwrite x (r,) with Qᵀ x, Q the product of the reflectors in B."""
+    for k in range(m):
+        s = 0.0
+        for a in range(k, r):
+            s += B[k, a] * x[a]
+        s *= scale[k]
+        for a in range(k, r):
+            x[a] -= s * B[k, a]
+
+
+@jit
+def solve_upper(R, m, x):
+    """Overwrite x (m,) with R⁻¹ x."""
+    for i in range(m - 1, -1, -1):
+        s = x[i]
+        for k in range(i + 1, m):
+            s -= R[i, k] * x[k]
+        x[i] = s / R[i, i]
+
+
+@jit
 def solve_upper_transposed(R, m, x):
     """Overwrite x (m,) with R⁻ᵀ x."""
     for i in range(m):

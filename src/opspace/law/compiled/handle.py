@@ -32,6 +32,7 @@ from numba.np.arrayobj import make_array, populate_array
 from numba.np.numpy_support import from_dtype
 
 WORD = 8
+WORDS = (np.dtype(np.float64), np.dtype(np.int64))
 
 
 class HandleType(types.Type):
@@ -77,8 +78,10 @@ class Handle:
             if isinstance(field, Handle):
                 words.append(field.address)
                 continue
-            if not field.flags.carray:
-                raise ValueError(f"{kind}.{name} must be contiguous, aligned and writable")
+            if not field.flags.carray or field.dtype not in WORDS:
+                raise ValueError(
+                    f"{kind}.{name} must be contiguous, aligned, writable and of words"
+                )
             words += [_address(field), *field.shape]
         self._words = np.array(words, np.uintp)
         self.address = _address(self._words)

@@ -6,19 +6,26 @@ import math
 
 from opspace.law.compiled.algebra import (
     apply_reflectors,
+    apply_reflectors_transposed,
     cholesky,
     householder,
     singular_values,
     solve_lower,
     solve_lower_transposed,
+    solve_upper,
     solve_upper_transposed,
 )
 from opspace.law.compiled.jit import jit
 from opspace.law.compiled.profiles import profile
 from opspace.law.hierarchy import RANK_TOLERANCE
 
-REGULAR = 1e-4
+REGULAR = 1e-6
 """Without a buffer, a level whose smallest σ is above this fraction of ‖J‖² has full rank."""
+
+
+NORMAL = 1e-4
+"""Normal equations lose the digits of the condition number twice: above this fraction of ‖B‖² they
+lose four."""
 
 
 @jit
@@ -260,15 +267,37 @@ def _turn(m, n, r, B, scale, turned, w):
 
 @jit
 def _solve_tall(d, m, n, r, bound, s):
-    """At least as many rows as free motions, all of them used: least squares, nothing is left free.
-
-    By the normal equations BᵀB x = Bᵀ residual, which are exact enough above the bound and cost a
-    third of an orthogonal factorisation.
-    """
-    B, C, G, L, x, residual = s.B, s.C, s.G, s.R, s.x, s.residual
+    """At least as many rows as free motions, all of them used: least squares, nothing is left free."""
+    B, C, x, residual = s.B, s.C, s.x, s.residual
+    size = 0.0
     for b in range(r):
         for i in range(m):
             C[b, i] = B[i, b]
+            size += C[b, i] * C[b, i]
+    enough = NORMAL * size
+    if not _solve_normal(m, r, max(bound, enough), s):
+        if bound >= enough:
+            return False
+        householder(C, r, m, s.scale, s.R)
+        if not _regular(s.R, r, bound, s):
+            return False
+        for i in range(m):
+            x[i] = residual[i]
+        apply_reflectors_transposed(C, r, m, s.scale, x)
+        solve_upper(s.R, r, x)
+    _step(n, r, s.Z[d], x, s.u[d], s.u[d + 1])
+    s.free[d + 1] = 0
+    return True
+
+
+@jit
+def _solve_normal(m, r, bound, s):
+    """Solve BᵀB x = Bᵀ residual, at a third of the cost of an orthogonal factorisation.
+
+    Returns:
+        Whether all eigenvalues of BᵀB are above the bound; otherwise there is no x.
+    """
+    C, G, L, x, residual = s.C, s.G, s.R, s.x, s.residual
     for a in range(r):
         for b in range(a + 1):
             total = 0.0
@@ -285,8 +314,6 @@ def _solve_tall(d, m, n, r, bound, s):
         x[a] = total
     solve_lower(L, r, x)
     solve_lower_transposed(L, r, x)
-    _step(n, r, s.Z[d], x, s.u[d], s.u[d + 1])
-    s.free[d + 1] = 0
     return True
 
 
