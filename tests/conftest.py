@@ -25,8 +25,12 @@ settings.load_profile("opspace")
 
 
 def pytest_configure(config):
-    """Compile once, before several workers would do it at the same time."""
+    """Have the tick ready before any test, and in every worker.
+
+    Compiled once for all workers, and linked before a test of one of its parts brings another copy of
+    that part: what runs here is what runs in every other process, to the last bit.
+    """
+    del config
     from opspace.controller.compiled.warm_up import compiled_tick
 
-    if config.getoption("numprocesses", None) and not hasattr(config, "workerinput"):
-        compiled_tick()
+    compiled_tick()
