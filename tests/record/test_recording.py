@@ -107,9 +107,12 @@ def test_the_same_run_gives_the_same_bytes(tmp_path):
 # -- how a run can end ----------------------------------------------------------------------------
 
 ENDLESS = """
+    import signal
     import sys
     import numpy as np
     from opspace.record import Column, Recorder
+    # Whoever runs the tests in the background has it ignored.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     columns = [Column("t", "s")] + [Column(f"x/{i}", "1") for i in range(40)]
     with Recorder(sys.argv[1], columns, {}) as recorder:
         k = 0
@@ -133,7 +136,10 @@ def test_a_killed_process_loses_nothing(tmp_path, sent, how):
     ) as process:
         assert process.stdout.readline() == b"ready\n"
         process.send_signal(sent)
-        process.wait(10)
+        try:
+            process.wait(10)
+        finally:
+            process.kill()
     recording = load(run)
     assert recording.ended.how == how
     assert len(recording) >= 200
