@@ -34,14 +34,14 @@ class TaskTerms:
     error: Array
 
 
-class Changes:
+class LastChange:
     """Tells a tick that some task may have changed: ``last`` is another object after every change."""
 
     def __init__(self) -> None:
         self.last = object()
 
 
-CHANGES = Changes()
+CHANGES = LastChange()
 """Of all tasks there are: most ticks find that nothing has changed, and look at no task."""
 
 
