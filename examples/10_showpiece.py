@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 
 import opspace as osc
+from opspace.runs.run import run_scenario
 from opspace.scenario import load_scenario
-from opspace.scenario.run import run_scenario
 
 with tempfile.TemporaryDirectory() as folder:
     scenario = load_scenario("showpiece", ["duration=4.0"])

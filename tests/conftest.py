@@ -31,6 +31,6 @@ def pytest_configure(config):
     that part: what runs here is what runs in every other process, to the last bit.
     """
     del config
-    from opspace.controller.compiled.warm_up import compiled_tick
+    from opspace.controller.warm_up import compiled_tick
 
     compiled_tick()

@@ -13,7 +13,7 @@ import numpy as np
 
 from opspace.plots.labels import number
 from opspace.record.format import read_json
-from opspace.sweep.measures import UNITS
+from opspace.sweep.limit_measures import UNITS
 
 PAGE = Path(__file__).resolve().parents[1] / "safety.md"
 BLOCK = re.compile(r"(<!-- campaign -->\n).*?(<!-- /campaign -->)", re.DOTALL)

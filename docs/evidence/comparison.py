@@ -4,8 +4,8 @@ import re
 from pathlib import Path
 
 from opspace.compare import METHODS, Comparison, compare_scenario
+from opspace.runs.progress import ProgressBar
 from opspace.scenario import load_scenario
-from opspace.scenario.progress import ProgressBar
 
 SCENARIO = "showpiece-panda"
 ROOT = Path(__file__).resolve().parents[2]

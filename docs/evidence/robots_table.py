@@ -15,9 +15,9 @@ from pathlib import Path
 
 from buffer_document import DOCS, EVIDENCE, number, read_csv, replace_block, table, write_csv
 
-from opspace.scenario.experiments import Experiment, fast_approaches, joint_limit, singularity
-from opspace.scenario.metrics import UNITS
-from opspace.scenario.run import limited_joint, run_scenario
+from opspace.runs.experiments import Experiment, fast_approaches, joint_limit, singularity
+from opspace.runs.metrics import UNITS
+from opspace.runs.run import limited_joint, run_scenario
 
 CSV = EVIDENCE / "robots_table.csv"
 DOCUMENT = DOCS / "robots.md"

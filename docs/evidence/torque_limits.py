@@ -10,12 +10,13 @@ from pathlib import Path
 
 import numpy as np
 
-from opspace.controller import Status
-from opspace.controller.calibration import sample_postures
+from opspace.command import Status
+from opspace.loop import StopRule, simulate
+from opspace.plan.calibration import sample_postures
 from opspace.plots.labels import number
 from opspace.scenario.build import build, build_robot
 from opspace.scenario.load import load_scenario
-from opspace.sim import Plant, StopRule, simulate
+from opspace.sim import MujocoPlant
 
 SCENARIO = "showpiece-panda"
 PAGE = Path(__file__).resolve().parents[1] / "safety.md"
@@ -53,7 +54,7 @@ def run(limit, mode):
     if limit is not None:
         # After the controller was built: what joints can brake with stays what it is.
         robot.torque_limit = limit
-        plant = Plant(robot, plant.q, dt=built.scenario.dt)
+        plant = MujocoPlant(robot, plant.q, dt=built.scenario.dt)
     watch = Watch(robot)
     stop = StopRule(max_joint_speed=GIVE_UP_SPEED)
     outcome = simulate(plant, built.controller, built.scenario.duration, [watch], stop)

@@ -16,7 +16,7 @@ import numpy as np
 from playwright.sync_api import sync_playwright
 
 import opspace as osc
-from opspace.sim.requests import FILE, Changes, RequestPlayer, RunRequest
+from opspace.loop.requests import FILE, Changes, RequestPlayer, RunRequest
 
 SECONDS = 12.0
 WATCHED = "results/timing/watched"
@@ -84,7 +84,7 @@ def objects():
     tasks = [osc.OrientationTask(), osc.PositionTask(max_speed=0.5), osc.PostureTask()]
     controller = osc.Controller(robot, osc.Stack(tasks))
     controller.warm_up()
-    return controller, osc.Plant(robot, robot.q_reference), Clock(controller)
+    return controller, osc.MujocoPlant(robot, robot.q_reference), Clock(controller)
 
 
 def elbow():

@@ -8,13 +8,11 @@ from importlib import import_module, metadata
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from opspace.controller import Calibration as Calibration
-    from opspace.controller import Command as Command
+    from opspace.command import Command as Command
+    from opspace.command import LevelStatus as LevelStatus
+    from opspace.command import Status as Status
+    from opspace.command import TaskStatus as TaskStatus
     from opspace.controller import Controller as Controller
-    from opspace.controller import LevelStatus as LevelStatus
-    from opspace.controller import Singularity as Singularity
-    from opspace.controller import Status as Status
-    from opspace.controller import TaskStatus as TaskStatus
     from opspace.errors import InputError as InputError
     from opspace.errors import MissingExtraError as MissingExtraError
     from opspace.errors import ModelError as ModelError
@@ -31,6 +29,14 @@ if TYPE_CHECKING:
     from opspace.law import TaskSet as TaskSet
     from opspace.law import intermediate_values as intermediate_values
     from opspace.law import task_torque as task_torque
+    from opspace.loop import Observer as Observer
+    from opspace.loop import Outcome as Outcome
+    from opspace.loop import Plant as Plant
+    from opspace.loop import Stepping as Stepping
+    from opspace.loop import StopRule as StopRule
+    from opspace.loop import simulate as simulate
+    from opspace.plan.calibration import Calibration as Calibration
+    from opspace.plan.scales import Singularity as Singularity
     from opspace.record import Column as Column
     from opspace.record import Recorder as Recorder
     from opspace.record import Recording as Recording
@@ -43,11 +49,7 @@ if TYPE_CHECKING:
     from opspace.robots import RobotInfo as RobotInfo
     from opspace.robots import available_robots as available_robots
     from opspace.robots import load_robot as load_robot
-    from opspace.sim import Observer as Observer
-    from opspace.sim import Outcome as Outcome
-    from opspace.sim import Plant as Plant
-    from opspace.sim import StopRule as StopRule
-    from opspace.sim import simulate as simulate
+    from opspace.sim import MujocoPlant as MujocoPlant
     from opspace.stack import Stack as Stack
     from opspace.tasks import ActivationProduct as ActivationProduct
     from opspace.tasks import Chain as Chain
@@ -80,9 +82,8 @@ if TYPE_CHECKING:
     from opspace.view import Viewer as Viewer
 
 _NAMES = {
-    "opspace.controller": (
-        "Calibration Command Controller LevelStatus Singularity Status TaskStatus"
-    ),
+    "opspace.command": "Command LevelStatus Status TaskStatus",
+    "opspace.controller": "Controller",
     "opspace.errors": (
         "InputError MissingExtraError ModelError OpspaceError RecordingError ScenarioError "
         "UnknownNameError"
@@ -95,7 +96,10 @@ _NAMES = {
     "opspace.record.observer": "TickRecorder",
     "opspace.record.replay": "Replay replay",
     "opspace.robots": "Robot RobotInfo available_robots load_robot",
-    "opspace.sim": "Observer Outcome Plant StopRule simulate",
+    "opspace.loop": "Observer Outcome Plant Stepping StopRule simulate",
+    "opspace.plan.calibration": "Calibration",
+    "opspace.plan.scales": "Singularity",
+    "opspace.sim": "MujocoPlant",
     "opspace.stack": "Stack",
     "opspace.tasks": (
         "ActivationProduct Chain Circle ComTask Constant DistanceBuffer JerkLimited JointBuffer "

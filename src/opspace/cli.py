@@ -19,7 +19,7 @@ import typer
 from opspace.errors import OpspaceError
 
 if TYPE_CHECKING:
-    from opspace.scenario.run import RunResult
+    from opspace.runs.run import RunResult
 
 BAD_INPUT = 2
 INTERRUPTED = 130
@@ -163,10 +163,10 @@ def run(
     ] = None,
 ) -> None:
     """Simulate a scenario, record it and measure it."""
+    from opspace.runs.progress import ProgressBar
+    from opspace.runs.run import run_scenario
+    from opspace.runs.tables import metrics_table, timeline_table
     from opspace.scenario import load_scenario
-    from opspace.scenario.progress import ProgressBar
-    from opspace.scenario.run import run_scenario
-    from opspace.scenario.tables import metrics_table, timeline_table
 
     loaded = load_scenario(scenario, overrides or ())
     out = out or Path("results") / Path(scenario).stem
@@ -205,9 +205,9 @@ def reproduce(
     out: Annotated[Path, typer.Option(help="Directory to write to.")] = Path("results"),
 ) -> None:
     """Repeat the paper's experiments: without the method, with a hard switch, and with it."""
-    from opspace.scenario.progress import ProgressBar
-    from opspace.scenario.reproduce import EXPERIMENTS, draw, reproduce
-    from opspace.scenario.tables import metrics_table
+    from opspace.runs.progress import ProgressBar
+    from opspace.runs.reproduce import EXPERIMENTS, draw, reproduce
+    from opspace.runs.tables import metrics_table
 
     wanted = EXPERIMENTS if which is Which.ALL else (which.value,)
     with ProgressBar() as progress:
@@ -238,8 +238,8 @@ def compare(
 ) -> None:
     """Run a scenario under other ways to change tasks: one table and one figure."""
     from opspace.compare import METHODS, compare_scenario
+    from opspace.runs.progress import ProgressBar
     from opspace.scenario import load_scenario
-    from opspace.scenario.progress import ProgressBar
 
     out = out or Path("results") / "compare" / Path(scenario).stem
     loaded = load_scenario(scenario, overrides or ())
@@ -326,12 +326,12 @@ def sweep(
     from opspace.errors import InputError
     from opspace.plots import save
     from opspace.plots.sweep import sweep_figure
+    from opspace.runs.progress import counter
     from opspace.scenario import load_scenario
     from opspace.scenario.load import to_dict
-    from opspace.scenario.progress import counter
     from opspace.sweep import SweepPlan, Variation, run_sweep
-    from opspace.sweep.measures import UNITS
-    from opspace.sweep.plan import RANDOM
+    from opspace.sweep.limit_measures import UNITS
+    from opspace.sweep.sweep_plan import RANDOM
 
     drawn = scenario == RANDOM
     if drawn and overrides:
@@ -356,8 +356,8 @@ def check(
 ) -> None:
     """Tell what the controller will see of a robot."""
     from opspace.robots import load_robot
-    from opspace.scenario.check import check_robot, to_plain
-    from opspace.scenario.tables import joints_table
+    from opspace.runs.check import check_robot, to_plain
+    from opspace.runs.tables import joints_table
 
     report = check_robot(load_robot(robot))
     if as_json:
@@ -408,8 +408,8 @@ def view(
 ) -> None:
     """Watch a run in a browser: live, with buttons to change it, or recorded."""
     from opspace.record.format import HEADER
+    from opspace.runs.watch import next_directory, watch_scenario
     from opspace.scenario import load_scenario
-    from opspace.scenario.watch import next_directory, watch_scenario
 
     if Path(what).is_dir() or (Path(what) / HEADER).exists():
         _view_recording(Path(what), host, port)
@@ -467,7 +467,7 @@ def replay(
     ],
 ) -> None:
     """Put the recorded states to a fresh controller and compare the torques."""
-    from opspace.scenario.replay import replay
+    from opspace.runs.replay_run import replay
 
     found = replay(recording)
     print(f"{found.ticks} ticks; how the recorded run ended: {found.ended}")
@@ -495,12 +495,12 @@ def film(
     ] = None,
 ) -> None:
     """Draw a run as an animated GIF or as an MP4."""
+    from opspace.pictures.film import film
     from opspace.record import load
+    from opspace.runs.progress import counter
+    from opspace.runs.run import SCENARIO
     from opspace.scenario import load_scenario
     from opspace.scenario.build import build_robot
-    from opspace.scenario.progress import counter
-    from opspace.scenario.run import SCENARIO
-    from opspace.sim.film import film
 
     loaded = load(recording)
     path = out or loaded.directory / "film.gif"
@@ -532,7 +532,7 @@ def export(
     from opspace.errors import InputError, unknown_name
     from opspace.export import FORMATS, export
     from opspace.record import load
-    from opspace.scenario.progress import counter
+    from opspace.runs.progress import counter
 
     if to is None and out is None:
         raise InputError(f"name a format or a file: --to takes {', '.join(FORMATS)}")

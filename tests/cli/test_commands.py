@@ -67,7 +67,7 @@ def test_an_interrupted_run_keeps_its_rows(capsys, monkeypatch, tmp_path, scenar
         if command.t > 0.02:
             raise KeyboardInterrupt
 
-    monkeypatch.setattr("opspace.scenario.progress.ProgressLine.observe", interrupt)
+    monkeypatch.setattr("opspace.runs.progress.ProgressLine.observe", interrupt)
     out = tmp_path / "out"
     status, _, err = run(capsys, "run", str(scenario), "--out", str(out))
     assert (status, err) == (130, "opspace: interrupted\n")
@@ -196,7 +196,7 @@ def test_film_writes_what_the_ending_says(capsys, tmp_path, scenario, monkeypatc
     def draw(recording, robot, path, **options):
         drawn.append((len(recording), robot.name, path, options["fps"], options["speed"]))
 
-    monkeypatch.setattr("opspace.sim.film.film", draw)
+    monkeypatch.setattr("opspace.pictures.film.film", draw)
     assert run(capsys, "film", str(out)) == (0, f"results: {out / 'film.gif'}\n", "")
     words = ["film", str(out), "--out", str(tmp_path / "x.mp4"), "--speed", "2", "--fps", "5"]
     assert run(capsys, *words)[0] == 0
@@ -220,8 +220,8 @@ def test_check_is_the_same_in_tables_and_json(capsys):
 
 
 def test_reproduce_prints_a_table_for_each_experiment(capsys, monkeypatch, tmp_path):
-    from opspace.scenario import reproduce
-    from opspace.scenario.experiments import VARIANTS, Experiment
+    from opspace.runs import reproduce
+    from opspace.runs.experiments import VARIANTS, Experiment
 
     runs = {name: short(method=method) for name, method in VARIANTS.items()}
     quick = Experiment("singularity", "a moment", runs)

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import opspace as osc
-from opspace.controller.compiled.batch import ticks
-from opspace.controller.compiled.layout import REMEMBERS, TURN
+from opspace.kernels.columns import REMEMBERS, TURN
+from opspace.kernels.many_states import ticks
 from opspace.robots import available_robots
 from tests.controller.test_compiled import Spring, circle
 

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from opspace.controller import Controller
+from opspace.loop import simulate
 from opspace.robots import load_robot
-from opspace.sim import Plant, simulate
+from opspace.sim import MujocoPlant
 from opspace.stack import Stack
 from opspace.tasks import MinimumJerk, PositionTask, PostureTask
 
@@ -39,7 +40,7 @@ def led_out(robot, **options):
     hand = PositionTask("tip", kp=100.0, name="hand", **options)
     controller = Controller(robot, Stack([hand, PostureTask(kp=25.0)]))
     start = np.array([0.2, 1.2, 0.3])
-    plant = Plant(robot, start)
+    plant = MujocoPlant(robot, start)
     robot.update(start, np.zeros(3))
     here = robot.position(robot.frame_id("tip")).copy()
     hand.target = MinimumJerk(here, 2.0 * here, duration=2.0)

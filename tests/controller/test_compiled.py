@@ -6,12 +6,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import opspace as osc
-from opspace.controller import Controller, ReferenceController, Singularity
-from opspace.controller.compiled.tick import tick
+from opspace.controller import Controller, ReferenceController
+from opspace.kernels.tick import tick
+from opspace.loop import simulate
+from opspace.plan.scales import Singularity
 from opspace.robots import available_robots, load_robot
 from opspace.scenario.build import build
 from opspace.scenario.load import load_scenario
-from opspace.sim import simulate
 from opspace.stack import Stack
 from opspace.tasks import (
     ComTask,

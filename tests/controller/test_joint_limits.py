@@ -5,10 +5,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from opspace.controller import Controller, Status
+from opspace.command import Status
+from opspace.controller import Controller
 from opspace.errors import InputError, UnknownNameError
+from opspace.loop import simulate
 from opspace.robots import load_robot
-from opspace.sim import Plant, simulate
+from opspace.sim import MujocoPlant
 from opspace.stack import Stack
 from opspace.tasks import JointLimits, MinimumJerk, OrientationTask, PositionTask, PostureTask
 from opspace.tasks.joint_limits import Side
@@ -175,7 +177,7 @@ def test_stiff_tasks_do_not_wake_limits_that_are_far_away(robot):
     position = PositionTask(target=target, kp=2500.0)
     posture = PostureTask(robot.q_reference)
     controller = Controller(robot, Stack([JointLimits(), OrientationTask(), position, posture]))
-    plant = Plant(robot, robot.q_reference, torque_limits=False)
+    plant = MujocoPlant(robot, robot.q_reference, torque_limits=False)
     torques, awake = [], []
 
     class Watch:
@@ -193,7 +195,7 @@ def test_a_joint_that_starts_outside_comes_back_and_stays(robot):
     q = robot.q_reference.copy()
     limits = JointLimits(joints={"joint1": (q[0] - 1.0, q[0] - 0.3), "joint3": (q[2] + 0.2, 0.0)})
     controller = Controller(robot, Stack([limits, PostureTask(q)]))
-    plant = Plant(robot, q, torque_limits=False)
+    plant = MujocoPlant(robot, q, torque_limits=False)
     path = []
 
     class Watch:

@@ -5,8 +5,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from opspace.controller import Controller, Singularity, Status
+from opspace.command import Status
+from opspace.controller import Controller
 from opspace.errors import InputError, UnknownNameError
+from opspace.plan.scales import Singularity
 from opspace.robots import load_robot
 from opspace.stack import Stack
 from opspace.tasks import (

@@ -7,9 +7,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from opspace.controller import Controller, ReferenceController, Status
-from opspace.controller.compiled.plan import Plan
+from opspace.command import Status
+from opspace.controller import Controller, ReferenceController
 from opspace.errors import InputError, UnknownNameError
+from opspace.plan.plan import Plan
 from opspace.robots import load_robot
 from opspace.stack import Stack
 from opspace.tasks import JointTask, PositionTask, PostureTask

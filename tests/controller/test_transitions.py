@@ -5,9 +5,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from opspace.controller import Controller, ReferenceController, Singularity
+from opspace.controller import Controller, ReferenceController
 from opspace.errors import InputError, UnknownNameError
 from opspace.law import TaskSet, Weighted, blended_torque, corners
+from opspace.plan.scales import Singularity
 from opspace.robots import load_robot
 from opspace.stack import Stack, mixture
 from opspace.tasks import (

@@ -11,7 +11,7 @@ from opspace.record import load
 
 SMALL = """
 import numpy as np
-from opspace.law.compiled.jit import jit
+from opspace.machine.jit import jit
 
 def total(x):
     return x.sum()
@@ -24,7 +24,7 @@ def calls():
 START = """
 import sys
 import small
-from opspace.controller.compiled.warm_up import ready
+from opspace.controller.warm_up import ready
 sys.executable = {python!r}
 ready("a sum", small.calls)
 stats = small.total.stats

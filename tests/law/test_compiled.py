@@ -7,15 +7,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from opspace.kernels.algebra import cholesky, singular_values
+from opspace.kernels.corners import sort_corners
+from opspace.kernels.inertia import inertia_handle, make_inertia
+from opspace.kernels.profiles import PROFILE_CODE, profile, ramp
+from opspace.kernels.walk import begin, pass_on, slot_bit, walk
 from opspace.law import SigmaBuffer, TaskSet, blended_torque, corners
 from opspace.law.activation import PROFILES, Profile, Ramp
-from opspace.law.compiled.algebra import cholesky, singular_values
-from opspace.law.compiled.corners import sort_corners
-from opspace.law.compiled.inertia import inertia_handle, make_inertia
-from opspace.law.compiled.profiles import PROFILE_CODE, profile, ramp
-from opspace.law.compiled.space import make_space, space_handle
-from opspace.law.compiled.walk import begin, pass_on, slot_bit, walk
 from opspace.law.hierarchy import whiten
+from opspace.plan.space import make_space, space_handle
 
 
 def random_stack(rng):

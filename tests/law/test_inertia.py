@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from opspace.law.compiled.inertia import (
+from opspace.kernels.inertia import (
     acceleration_of,
     factor,
     inertia_handle,

@@ -6,10 +6,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from opspace.kernels.inertia import factor, inertia_handle, make_inertia
+from opspace.kernels.projection import bounds_handle, make_bounds
+from opspace.kernels.projection import nearest_acceleration as compiled
 from opspace.law import excess, nearest_acceleration
-from opspace.law.compiled.inertia import factor, inertia_handle, make_inertia
-from opspace.law.compiled.nearest import bounds_handle, make_bounds
-from opspace.law.compiled.nearest import nearest_acceleration as compiled
 
 INF = np.inf
 

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from opspace.errors import InputError
 from opspace.law import Buffer, SigmaBuffer, TaskSet, task_torque
 from opspace.law.hierarchy import start
-from opspace.law.singularity import solve_level_smoothly
+from opspace.law.singular_directions import solve_level_smoothly
 from tests.budget import examples
 from tests.law.stacks import inertia, stacks
 

@@ -17,9 +17,13 @@ from opspace.plots import (
     singularity_figures,
 )
 from opspace.plots.joint_limit import limit_figure
+from opspace.plots.joint_torque import torque_figure
 from opspace.plots.overview import draw_overview
-from opspace.plots.singularity import activation_figure, joint_speed_figure, position_figure
-from opspace.plots.torque import torque_figure
+from opspace.plots.singular_directions_plot import (
+    activation_figure,
+    joint_speed_figure,
+    position_figure,
+)
 from opspace.record import Column, Recorder, load
 from tests.plots import inspection, synthetic
 

@@ -13,8 +13,8 @@ from opspace import Status
 from opspace.cli import main
 from opspace.errors import InputError, RecordingError
 from opspace.record.black_box import MOST
+from opspace.runs.replay_run import replay
 from opspace.scenario.build import build
-from opspace.scenario.replay import replay
 
 ROBOT = osc.load_robot("puma560")
 REST = np.zeros(6)

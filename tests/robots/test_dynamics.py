@@ -10,8 +10,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from opspace.kernels.dynamics import evaluate
 from opspace.robots import Robot, load_robot
-from opspace.robots.dynamics import evaluate, make_dynamics
+from opspace.robots.bodies import make_dynamics
 from opspace.robots.rigid_model import rigid_model
 from tests.robots.samples import BACKENDS, NAMES, random_state
 

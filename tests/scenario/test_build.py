@@ -46,8 +46,8 @@ def entry_defaults(entry):
     [
         (schema.Singularity, opspace.controller.Singularity),
         (schema.JointLimits, opspace.tasks.JointLimits),
-        (schema.Plant, (opspace.sim.Plant, opspace.sim.Disturbances)),
-        (schema.Stop, opspace.sim.StopRule),
+        (schema.Plant, (opspace.sim.MujocoPlant, opspace.sim.Disturbances)),
+        (schema.Stop, opspace.loop.StopRule),
         *KINDS.items(),
     ],
 )

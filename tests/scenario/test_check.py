@@ -5,9 +5,10 @@ import json
 import numpy as np
 import pytest
 
-from opspace.controller import Controller, Singularity
+from opspace.controller import Controller
+from opspace.plan.scales import Singularity
 from opspace.robots import load_robot
-from opspace.scenario.check import check_robot, to_plain
+from opspace.runs.check import check_robot, to_plain
 from opspace.stack import Stack
 from opspace.tasks import PositionTask
 

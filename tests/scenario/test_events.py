@@ -6,11 +6,11 @@ import pytest
 from opspace.cli import main
 from opspace.errors import ScenarioError
 from opspace.record import load
+from opspace.runs.metrics import largest_torque_step
+from opspace.runs.run import run_scenario
+from opspace.runs.tables import timeline_table
 from opspace.scenario import dump_scenario
 from opspace.scenario.build import build
-from opspace.scenario.metrics import largest_torque_step
-from opspace.scenario.run import run_scenario
-from opspace.scenario.tables import timeline_table
 from tests.scenario.short import HOLD, short
 
 TASKS = {

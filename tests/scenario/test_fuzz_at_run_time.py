@@ -13,8 +13,8 @@ import opspace as osc
 from opspace.errors import OpspaceError
 from opspace.plots.columns import plot_columns
 from opspace.record.format import DATA, END, HEADER, META
+from opspace.runs.replay_run import replay
 from opspace.scenario.build import build
-from opspace.scenario.replay import replay
 from tests.scenario.short import short
 from tests.scenario.test_fuzz import ODD, damaged, mutated, named
 

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from opspace.errors import UnknownNameError
 from opspace.record import Column, Recorder, Recording, load
 from opspace.record.format import End
-from opspace.scenario.metrics import UNITS, Metrics, measure
+from opspace.runs.metrics import UNITS, Metrics, measure
 
 TICKS = 200
 DT = 0.01

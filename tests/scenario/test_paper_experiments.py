@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from opspace.record import load
-from opspace.scenario.reproduce import EXPERIMENTS, reproduce
+from opspace.runs.reproduce import EXPERIMENTS, reproduce
 
 
 @pytest.fixture(scope="module")

@@ -21,7 +21,7 @@ from opspace.scenario import (
     to_dict,
 )
 from opspace.scenario.document import parse
-from opspace.stack.blending import EXACT
+from opspace.stack.groups import EXACT
 from tests.scenario.examples import EVERYTHING, scenarios
 
 TASKS = {

@@ -9,8 +9,8 @@ from opspace.cli import main
 from opspace.errors import RecordingError
 from opspace.record import load
 from opspace.record.format import DATA, HEADER
-from opspace.scenario.replay import replay
-from opspace.scenario.run import run_scenario
+from opspace.runs.replay_run import replay
+from opspace.runs.run import run_scenario
 from tests.scenario.short import HOLD, short
 
 TASKS = {

@@ -5,9 +5,9 @@ import json
 import pytest
 
 from opspace.record import load
-from opspace.scenario import reproduce as module
-from opspace.scenario.experiments import VARIANTS, Experiment
-from opspace.scenario.reproduce import EXPERIMENTS, draw, reproduce
+from opspace.runs import reproduce as module
+from opspace.runs.experiments import VARIANTS, Experiment
+from opspace.runs.reproduce import EXPERIMENTS, draw, reproduce
 from tests.scenario.short import short
 
 KEYS = {

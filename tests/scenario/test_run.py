@@ -6,9 +6,9 @@ import pytest
 
 from opspace.errors import InputError, RecordingError
 from opspace.record import load
+from opspace.runs.metrics import measure
+from opspace.runs.run import first_return, limited_joint, run_scenario
 from opspace.scenario import load_scenario
-from opspace.scenario.metrics import measure
-from opspace.scenario.run import first_return, limited_joint, run_scenario
 from tests.scenario.short import short
 
 

@@ -5,18 +5,18 @@ import pytest
 
 import opspace as osc
 from opspace.record import load
+from opspace.runs.replay_run import replay
+from opspace.runs.run import run_scenario
 from opspace.scenario import load_scenario
 from opspace.scenario.load import scenario_from, to_dict
-from opspace.scenario.replay import replay
-from opspace.scenario.run import run_scenario
-from opspace.sim import Disturbances, Plant, Push
+from opspace.sim import Disturbances, MujocoPlant, Push
 
 PANDA = osc.load_robot("panda")
 Q = PANDA.q_reference
 
 
 def plant(**given):
-    return Plant(PANDA, Q, disturbances=Disturbances(**given))
+    return MujocoPlant(PANDA, Q, disturbances=Disturbances(**given))
 
 
 def short(**options):

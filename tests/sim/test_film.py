@@ -10,10 +10,10 @@ import pytest
 from PIL import Image
 
 from opspace.errors import InputError, MissingExtraError
+from opspace.pictures.film import BAND, film
+from opspace.pictures.movie_file import write_mp4
+from opspace.pictures.offscreen import SnapshotUnavailableError, canvas
 from opspace.robots import load_robot
-from opspace.sim.film import BAND, film
-from opspace.sim.movie_file import write_mp4
-from opspace.sim.offscreen import SnapshotUnavailableError, canvas
 from tests.plots import synthetic
 
 SIZE = (120, 90)
@@ -96,7 +96,7 @@ def test_a_film_that_fails_leaves_what_was_there(run, tmp_path, monkeypatch):
         yield from np.zeros((2, *size[::-1], 3), np.uint8)
         raise SnapshotUnavailableError("no more")
 
-    monkeypatch.setattr("opspace.sim.film.render", two_pictures)
+    monkeypatch.setattr("opspace.pictures.film.render", two_pictures)
     for name in ("run.gif", "run.mp4"):
         path = tmp_path / name
         path.write_text("old")
@@ -122,7 +122,8 @@ def test_pictures_that_ffmpeg_loses_are_noticed(tmp_path, monkeypatch):
 def test_a_run_of_one_moment_is_a_film_of_one_picture(run, tmp_path, monkeypatch):
     moment = dataclasses.replace(run, data=run.data[:1])
     monkeypatch.setattr(
-        "opspace.sim.film.render", lambda *_, size, **__: iter(np.zeros((1, *size, 3), np.uint8))
+        "opspace.pictures.film.render",
+        lambda *_, size, **__: iter(np.zeros((1, *size, 3), np.uint8)),
     )
     with Image.open(film(moment, load_robot("puma560"), tmp_path / "run.gif")) as picture:
         assert getattr(picture, "n_frames", 1) == 1

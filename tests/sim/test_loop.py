@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from opspace.sim import Outcome, StopRule, simulate
+from opspace.loop import Outcome, StopRule, simulate
 
 
 class Cart:

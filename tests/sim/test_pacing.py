@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from opspace.errors import InputError
-from opspace.sim.pacing import Pacing
+from opspace.loop.pacing import Pacing
 
 NOTHING = np.zeros(0)
 

@@ -12,9 +12,9 @@ from hypothesis.extra import numpy as hnp
 from PIL import Image
 
 from opspace.errors import InputError, OpspaceError, UnknownNameError
+from opspace.pictures.offscreen import SnapshotUnavailableError, camera_axes, canvas, fit_view
+from opspace.pictures.snapshots import snapshot_strip, snapshots
 from opspace.robots import load_robot
-from opspace.sim.offscreen import SnapshotUnavailableError, camera_axes, canvas, fit_view
-from opspace.sim.snapshots import snapshot_strip, snapshots
 from tests.plots import inspection, synthetic
 
 SIZE = (120, 90)
@@ -108,7 +108,7 @@ def test_an_opengl_that_fails_is_named():
     """In a process of its own: PyOpenGL settles on a platform once."""
     code = (
         "import mujoco\n"
-        "from opspace.sim.offscreen import *\n"
+        "from opspace.pictures.offscreen import *\n"
         f"model = mujoco.MjModel.from_xml_string({EMPTY!r})\n"
         "try:\n"
         "    with canvas(model, (9, 9)): pass\n"

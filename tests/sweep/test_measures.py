@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 from tests.scenario.short import short
 
-from opspace.controller import Status
-from opspace.controller.command import Command, Found
+from opspace.command import Command, Found, Status
 from opspace.scenario.build import build
-from opspace.sweep.measures import Watch
+from opspace.sweep.limit_measures import Watch
 
 LIMITS = {"joints": {"joint1": [-0.5, 0.5]}, "speeds": {"joint1": 1.0}, "clearance": 0.02}
 

@@ -14,10 +14,10 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from opspace.loop.requests import FILE
 from opspace.record import load
+from opspace.runs.run import SCENARIO, run_scenario
 from opspace.scenario.load import load_scenario
-from opspace.scenario.run import SCENARIO, run_scenario
-from opspace.sim.requests import FILE
 from tests.view.command import started
 
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser"))), None)

@@ -15,13 +15,13 @@ import pytest
 
 from opspace.cli import main
 from opspace.errors import OpspaceError
+from opspace.loop import simulate
+from opspace.loop.requests import FILE, RunRequest
 from opspace.record import Column, Recorder, load
+from opspace.runs.replay_run import replay
+from opspace.runs.run import SCENARIO, begin, late_tasks_of, recorded_levels, run_scenario
+from opspace.runs.watch import next_directory
 from opspace.scenario.build import build
-from opspace.scenario.replay import replay
-from opspace.scenario.run import SCENARIO, begin, late_tasks_of, recorded_levels, run_scenario
-from opspace.scenario.watch import next_directory
-from opspace.sim import simulate
-from opspace.sim.requests import FILE, RunRequest
 from opspace.view import Viewer
 from tests.scenario.short import HOLD, short
 from tests.view.command import started

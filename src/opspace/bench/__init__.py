@@ -1,6 +1,6 @@
 """How long a tick takes, beside other controllers in the same run."""
 
-from opspace.bench.run import Benchmark as Benchmark
-from opspace.bench.run import compare_runs as compare_runs
-from opspace.bench.run import run_benchmark as run_benchmark
+from opspace.bench.run_benchmark import Benchmark as Benchmark
+from opspace.bench.run_benchmark import compare_runs as compare_runs
+from opspace.bench.run_benchmark import run_benchmark as run_benchmark
 from opspace.bench.scenes import SCENES as SCENES

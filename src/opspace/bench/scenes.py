@@ -8,9 +8,9 @@ from types import MappingProxyType
 
 import numpy as np
 
-from opspace.controller import Controller, ReferenceController, Singularity
-from opspace.controller.options import DEFAULT_SINGULARITY
+from opspace.controller import Controller, ReferenceController
 from opspace.errors import missing_extra
+from opspace.plan.scales import DEFAULT_SINGULARITY, Singularity
 from opspace.robots import load_robot
 from opspace.robots.catalogue import CATALOGUE, locate
 from opspace.robots.loading import read_robot

@@ -10,8 +10,8 @@ import numpy as np
 
 from opspace.bench.scenes import Scene
 from opspace.controller import ReferenceController
-from opspace.controller.compiled.warm_up import compiled_tick
-from opspace.robots.base import AdapterBase
+from opspace.controller.warm_up import compiled_tick
+from opspace.robots.adapter import AdapterBase
 from opspace.robots.protocol import Robot
 from opspace.tasks import OrientationTask, PoseTask, PositionTask, PostureTask
 

@@ -2,5 +2,5 @@
 
 from opspace.compare.methods import METHODS as METHODS
 from opspace.compare.methods import Method as Method
-from opspace.compare.run import Comparison as Comparison
-from opspace.compare.run import compare_scenario as compare_scenario
+from opspace.compare.run_methods import Comparison as Comparison
+from opspace.compare.run_methods import compare_scenario as compare_scenario

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from opspace.command import Command
 from opspace.compare.blendings import CrossFade, Present
 from opspace.compare.laws import (
     REGULARISATION,
@@ -20,7 +21,7 @@ from opspace.compare.laws import (
     stack_of_tasks,
     weighted_least_squares,
 )
-from opspace.controller import Command, ReferenceController
+from opspace.controller import ReferenceController
 from opspace.law import LawInfo, TaskSet, Weighted, task_torque
 from opspace.stack import Member, Mixture
 from opspace.tasks import TaskTerms

@@ -8,10 +8,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from opspace.controller import Command, ReferenceController, Status
+from opspace.command import Command, Status
+from opspace.controller import ReferenceController
+from opspace.loop import Outcome
 from opspace.robots import Robot
 from opspace.scenario.events import Event
-from opspace.sim import Outcome
 
 
 @dataclass(frozen=True)

@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from opspace.command import Command, Found, Status, TaskStatus
 from opspace.compare.laws import SOFTNESS
-from opspace.controller import Command, ReferenceController, Status, TaskStatus
-from opspace.controller.command import Found
+from opspace.controller import ReferenceController
 from opspace.errors import InputError
 from opspace.stack import Member
 from opspace.tasks import PostureTask

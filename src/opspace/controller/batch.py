@@ -10,14 +10,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from opspace.controller.compiled.batch import Remembered, ticks
-from opspace.controller.compiled.layout import OWN, REMEMBERS, TURN
-from opspace.controller.compiled.packing import kind_of
-from opspace.controller.compiled.plan import Plan
 from opspace.errors import InputError
-from opspace.law.compiled.handle import Handle
-from opspace.robots.base import AdapterBase
-from opspace.robots.dynamics import make_dynamics
+from opspace.kernels.columns import OWN, REMEMBERS, TURN
+from opspace.kernels.many_states import Remembered, ticks
+from opspace.machine.record import Handle
+from opspace.plan.pack_task import kind_of
+from opspace.plan.plan import Plan
+from opspace.robots.adapter import AdapterBase
+from opspace.robots.bodies import make_dynamics
 from opspace.robots.motion_axes import MotionAxes
 from opspace.robots.rigid_model import RigidModel
 from opspace.stack import Member

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from opspace.controller.command import Status
-from opspace.controller.joint_limits import LimitTerms
+from opspace.command import Status
+from opspace.controller.limit_task_sets import LimitTerms
 from opspace.law import BROKEN, LOST, excess, nearest_acceleration
 
 

@@ -9,9 +9,14 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
+from opspace.command import Command, Status
 from opspace.controller.batch import Batch, check_members, checked_states, cores
-from opspace.controller.command import Command, Status
-from opspace.controller.compiled.layout import (
+from opspace.controller.disturbance import DisturbanceObserver
+from opspace.controller.reference import ReferenceController
+from opspace.controller.warm_up import compiled_batch, compiled_tick, tick_entry
+from opspace.controller.watchdog import Timing
+from opspace.errors import InputError
+from opspace.kernels.columns import (
     DAMPING,
     KEEP_TORQUE,
     OPTION_SIZE,
@@ -24,21 +29,16 @@ from opspace.controller.compiled.layout import (
     STATE_NOT_FINITE,
     TASK_BIAS,
 )
-from opspace.controller.compiled.plan import Plan
-from opspace.controller.compiled.report import CompiledReport
-from opspace.controller.compiled.warm_up import compiled_batch, compiled_tick, tick_entry
-from opspace.controller.disturbance import DisturbanceObserver
-from opspace.controller.tick import ReferenceController
-from opspace.controller.timing import Timing
-from opspace.errors import InputError
-from opspace.law.compiled.handle import Handle
-from opspace.law.compiled.profiles import PROFILE_CODE
-from opspace.robots.base import AdapterBase
-from opspace.robots.dynamics import make_dynamics
+from opspace.kernels.profiles import PROFILE_CODE
+from opspace.machine.record import Handle
+from opspace.plan.plan import Plan
+from opspace.plan.read_report import CompiledReport
+from opspace.robots.adapter import AdapterBase
+from opspace.robots.bodies import make_dynamics
 from opspace.robots.motion_axes import MotionAxes
 from opspace.robots.rigid_model import RigidModel
 from opspace.stack import Member
-from opspace.tasks.base import CHANGES
+from opspace.tasks.task import CHANGES
 from opspace.tasks.validation import finite, numbers
 
 STATUSES = tuple(Status(bits) for bits in range(2048))

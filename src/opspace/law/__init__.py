@@ -3,7 +3,7 @@
 from opspace.law.activation import PROFILES, Activation, Buffer, Profile, Ramp
 from opspace.law.blending import BLENDINGS, Weighted, combined, corners
 from opspace.law.nearest import BROKEN, LOST, excess, nearest_acceleration
-from opspace.law.singularity import SigmaBuffer
+from opspace.law.singular_directions import SigmaBuffer
 from opspace.law.tasksets import TaskSet
 from opspace.law.torque import COUPLINGS, LawInfo, blended_torque, intermediate_values, task_torque
 from opspace.law.tree import Motors

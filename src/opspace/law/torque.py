@@ -15,7 +15,7 @@ from opspace.errors import InputError, unknown_name
 from opspace.law.blending import BLENDINGS, Weighted, corners
 from opspace.law.hierarchy import hard_law, levels_of, whiten
 from opspace.law.recursion import Recursion, law_recursion
-from opspace.law.singularity import SigmaBuffer
+from opspace.law.singular_directions import SigmaBuffer
 from opspace.law.tasksets import TaskSet, as_list, check_inertia, check_tasks
 from opspace.law.tree import LevelReport, Motors, Walk
 

@@ -11,5 +11,5 @@ from opspace.plots.columns import overlay_columns as overlay_columns
 from opspace.plots.columns import plot_columns as plot_columns
 from opspace.plots.joint_limit import joint_limit_figures as joint_limit_figures
 from opspace.plots.overview import overview_figure as overview_figure
-from opspace.plots.singularity import singularity_figures as singularity_figures
+from opspace.plots.singular_directions_plot import singularity_figures as singularity_figures
 from opspace.plots.style import save as save

@@ -11,8 +11,8 @@ from matplotlib.figure import Figure
 
 from opspace.plots import runs as data
 from opspace.plots import style
+from opspace.plots.joint_torque import torque_figure
 from opspace.plots.labels import key_row
-from opspace.plots.torque import torque_figure
 from opspace.record import Recording
 
 

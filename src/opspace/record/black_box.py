@@ -14,7 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from opspace.controller import Command, ReferenceController, Status
+from opspace.command import Command, Status
+from opspace.controller import ReferenceController
 from opspace.errors import InputError, OpspaceError, RecordingError
 from opspace.record.format import Ended
 from opspace.record.observer import STATUS, state_columns

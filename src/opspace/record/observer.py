@@ -7,7 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from opspace.controller import Command, LevelStatus, ReferenceController, TaskStatus
+from opspace.command import Command, LevelStatus, TaskStatus
+from opspace.controller import ReferenceController
 from opspace.errors import InputError
 from opspace.record.format import Column, Ended
 from opspace.record.subject import subject_of

@@ -8,7 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from opspace.controller import Command, ReferenceController, Status
+from opspace.command import Command, Status
+from opspace.controller import ReferenceController
 from opspace.errors import OpspaceError, RecordingError
 from opspace.record.black_box import FIRST
 from opspace.record.reader import Recording, load

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from opspace.robots.dynamics import Dynamics, RigidBodies, make_dynamics, no_bodies
+from opspace.robots.bodies import Dynamics, RigidBodies, make_dynamics, no_bodies
 
 
 @dataclass(frozen=True)

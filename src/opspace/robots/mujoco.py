@@ -8,7 +8,7 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 
-from opspace.robots.base import AdapterBase
+from opspace.robots.adapter import AdapterBase
 from opspace.robots.description import Description
 from opspace.robots.motion_axes import FramePlace, MassPoint, MotionAxes
 from opspace.robots.pinocchio_model import frame_ids, model_from_mujoco

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from opspace.robots.base import AdapterBase
+from opspace.robots.adapter import AdapterBase
 from opspace.robots.description import Description
 from opspace.robots.motion_axes import MotionAxes
 from opspace.robots.pinocchio_model import frame_ids

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from opspace.robots.dynamics import (
+from opspace.robots.bodies import (
     ALIGNED,
     BALL,
     HINGE,

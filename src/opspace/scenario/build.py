@@ -8,14 +8,16 @@ from typing import Any
 
 import numpy as np
 
-from opspace.controller import Controller, ReferenceController, Singularity
+from opspace.controller import Controller, ReferenceController
 from opspace.errors import InputError, OpspaceError, UnknownNameError
+from opspace.loop import StopRule
+from opspace.plan.scales import Singularity
 from opspace.robots import Robot, load_robot
 from opspace.scenario.build_tasks import build_tasks, check_configuration, configuration
 from opspace.scenario.events import in_order, insertion_level, late_tasks
 from opspace.scenario.load import to_dict
 from opspace.scenario.schema import Scenario
-from opspace.sim import Disturbances, Plant, Push, StopRule
+from opspace.sim import Disturbances, MujocoPlant, Push
 from opspace.stack import Stack
 from opspace.tasks import JointLimits, Task
 
@@ -27,7 +29,7 @@ SCENARIO_KEY = "scenario"
 
 @dataclass(frozen=True)
 class Built:
-    """A scenario turned into objects, ready for `opspace.sim.simulate`.
+    """A scenario turned into objects, ready for `opspace.loop.simulate`.
 
     Attributes:
         scenario: What it was built from.
@@ -44,7 +46,7 @@ class Built:
     stack: Stack
     tasks: Mapping[str, Task]
     controller: ReferenceController
-    plant: Plant
+    plant: MujocoPlant
     stop: StopRule
 
     @property
@@ -93,10 +95,10 @@ def build(scenario: Scenario, controller: type[ReferenceController] = Controller
     return Built(scenario, robot, stack, tasks, driver, plant, stop)
 
 
-def _plant(scenario: Scenario, robot: Robot, q: np.ndarray) -> Plant:
+def _plant(scenario: Scenario, robot: Robot, q: np.ndarray) -> MujocoPlant:
     option = scenario.plant
     try:
-        return Plant(
+        return MujocoPlant(
             robot,
             q,
             dt=scenario.dt,

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from opspace.law import Weighted
-from opspace.stack.blending import Blending
+from opspace.stack.groups import Blending
 from opspace.stack.members import Member, Variable
 
 

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 
 from opspace.errors import InputError
-from opspace.stack.members import Member
-from opspace.stack.requests import (
+from opspace.stack.changes import (
     Insert,
     Move,
     Remove,
@@ -15,6 +14,7 @@ from opspace.stack.requests import (
     checked_level,
     checked_task,
 )
+from opspace.stack.members import Member
 from opspace.stack.transitions import Transitions
 from opspace.tasks import JointLimits, Task
 

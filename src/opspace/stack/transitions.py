@@ -9,8 +9,8 @@ from threading import Lock, RLock
 from typing import NamedTuple
 
 from opspace.errors import InputError, OpspaceError
+from opspace.stack.changes import Insert, Known, Request
 from opspace.stack.members import Member, Place, Variable
-from opspace.stack.requests import Insert, Known, Request
 from opspace.tasks import Task
 
 

@@ -6,8 +6,8 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 from opspace.errors import OpspaceError, missing_extra
-from opspace.sweep.plan import SweepPlan
 from opspace.sweep.row import empty_row, run_row
+from opspace.sweep.sweep_plan import SweepPlan
 
 AHEAD = 2
 """Tasks that wait for each core, so that none of them is idle."""

@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 
 from opspace.errors import OpspaceError
+from opspace.loop import simulate
 from opspace.scenario.build import build
 from opspace.scenario.load import to_dict
-from opspace.sim import simulate
-from opspace.sweep.measures import Watch
-from opspace.sweep.plan import SweepPlan, run_id
+from opspace.sweep.limit_measures import Watch
+from opspace.sweep.sweep_plan import SweepPlan, run_id
 
 ENDS = ("completed", "stopped", "refused", "crashed", "died", "timed out")
 """How a run can end: to its end; given up by a guard of the scenario; a scenario that cannot be run; an

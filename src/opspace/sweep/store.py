@@ -8,7 +8,7 @@ from typing import Any
 
 from opspace.errors import RecordingError
 from opspace.record.format import read_json, write_json
-from opspace.sweep.plan import SweepPlan
+from opspace.sweep.sweep_plan import SweepPlan
 
 PLAN = "sweep.json"
 ROWS = "rows"

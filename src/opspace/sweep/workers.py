@@ -12,9 +12,9 @@ from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
 from typing import Any
 
-from opspace.controller.compiled.warm_up import compiled_tick
-from opspace.sweep.plan import SweepPlan
+from opspace.controller.warm_up import compiled_tick
 from opspace.sweep.row import empty_row, run_row
+from opspace.sweep.sweep_plan import SweepPlan
 
 STARTING = 300.0
 """What a process may take until it begins with its first run, on a machine that is busy, s."""

@@ -3,8 +3,6 @@
 from opspace.tasks.activations import ActivationProduct as ActivationProduct
 from opspace.tasks.activations import DistanceBuffer as DistanceBuffer
 from opspace.tasks.activations import JointBuffer as JointBuffer
-from opspace.tasks.base import Task as Task
-from opspace.tasks.base import TaskTerms as TaskTerms
 from opspace.tasks.com import ComTask as ComTask
 from opspace.tasks.joint import JointTask as JointTask
 from opspace.tasks.joint_limits import JointLimits as JointLimits
@@ -26,4 +24,6 @@ from opspace.tasks.references import ViaPoints as ViaPoints
 from opspace.tasks.relative import RelativeOrientationTask as RelativeOrientationTask
 from opspace.tasks.relative import RelativePoseTask as RelativePoseTask
 from opspace.tasks.relative import RelativePositionTask as RelativePositionTask
+from opspace.tasks.task import Task as Task
+from opspace.tasks.task import TaskTerms as TaskTerms
 from opspace.tasks.tracking import TrackingTask as TrackingTask

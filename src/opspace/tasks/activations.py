@@ -15,7 +15,7 @@ from opspace.tasks.validation import finite_array, shown
 
 if TYPE_CHECKING:
     from opspace.robots.protocol import Robot
-    from opspace.tasks.base import Task
+    from opspace.tasks.task import Task
 
 
 class JointBuffer:

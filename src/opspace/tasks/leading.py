@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from opspace.errors import InputError
-from opspace.tasks.base import Task
 from opspace.tasks.motion_task import MotionTask
 from opspace.tasks.motions import CenterOfMass, WorldFrame
 from opspace.tasks.quantities import Orientation, Pose, Position
@@ -21,6 +20,7 @@ from opspace.tasks.references import (
     Reference,
     Sample,
 )
+from opspace.tasks.task import Task
 
 if TYPE_CHECKING:
     from opspace.robots.protocol import Robot

@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from opspace.errors import InputError
-from opspace.tasks.base import TaskTerms
 from opspace.tasks.motions import Motion, MotionSource, RelativeFrame
 from opspace.tasks.quantities import Quantity
 from opspace.tasks.references.sample import Reference, Sample
 from opspace.tasks.rotation import cross
+from opspace.tasks.task import TaskTerms
 from opspace.tasks.tracking import TrackingTask
 from opspace.tasks.validation import Array
 

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from opspace.errors import InputError
-from opspace.tasks.base import TaskTerms
 from opspace.tasks.joint_layout import Layout, joint_layout
 from opspace.tasks.references.sample import Reference, Sample
+from opspace.tasks.task import TaskTerms
 from opspace.tasks.tracking import Target, TrackingTask
 from opspace.tasks.validation import Array, finite_array
 

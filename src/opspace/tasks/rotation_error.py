@@ -4,12 +4,9 @@ from __future__ import annotations
 
 import math
 
+from opspace.law.scalars import BRANCH_HOLD
 from opspace.tasks.rotation import Quaternion, quaternion_from_matrix, rotation_vector
 from opspace.tasks.validation import Array
-
-# How far past half a turn the direction chosen before is kept, rad. Noise and overshoot near half
-# a turn are far smaller; at a full turn the direction would be lost, so it cannot be kept for ever.
-BRANCH_HOLD = 0.5 * math.pi
 
 
 class RotationError:

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from opspace.errors import InputError, UnknownNameError
-from opspace.tasks.base import Task, TaskTerms
 from opspace.tasks.references.sample import Reference, Sample
+from opspace.tasks.task import Task, TaskTerms
 from opspace.tasks.validation import Array, finite_array, shown
 
 if TYPE_CHECKING:

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from opspace.controller import Status
+from opspace.command import Status
 from opspace.view.frame import Frame, LevelFrame, TaskFrame
 
 ACTIVE, FADED, GONE = "#004488", "#BB5566", "#c4c4c4"

@@ -9,12 +9,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from opspace.controller import Command, ReferenceController
+from opspace.command import Command
+from opspace.controller import ReferenceController
 from opspace.errors import InputError, OpspaceError
+from opspace.loop.pacing import Pacing
+from opspace.loop.requests import FILE, Changes, RequestDesk, RunRequest
 from opspace.record.format import Ended
 from opspace.record.observer import State, TickRecorder
-from opspace.sim.pacing import Pacing
-from opspace.sim.requests import FILE, Changes, RequestDesk, RunRequest
 from opspace.tasks import Task
 from opspace.view.process import PageProcess, check_installed
 

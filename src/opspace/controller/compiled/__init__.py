@@ -1,1 +1,0 @@
-"""The tick compiled: from the robot's arrays to the torque in one call."""

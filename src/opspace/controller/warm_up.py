@@ -1,0 +1,155 @@
+"""Have everything compiled before the first tick, and say so when it takes long."""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections.abc import Callable
+from threading import Timer
+from typing import Any
+
+import numpy as np
+
+from opspace.kernels.columns import OPTION_SIZE, Tick
+from opspace.kernels.many_states import Remembered, ticks
+from opspace.kernels.spectrum import spectrum
+from opspace.kernels.tick import tick
+from opspace.machine.compile_apart import Calls, compile_apart
+from opspace.machine.jit import is_kept
+from opspace.machine.record import Handle
+from opspace.plan.memory import Sizes, make_tick, tick_handle
+from opspace.plan.space import Space
+from opspace.robots.bodies import ALIGNED, RigidBodies, make_dynamics
+from opspace.robots.motion_axes import MotionAxes
+from opspace.robots.rigid_model import RigidModel
+
+log = logging.getLogger("opspace")
+
+PATIENCE = 2.0
+"""Reading compiled code from the disk takes less than this, s."""
+
+
+def compiled_tick() -> float:
+    """Compile the tick or read it from the disk; immediate when that has happened already.
+
+    Returns:
+        How long it took, s.
+    """
+    return 0.0 if tick.signatures else ready("the control tick", first_tick)
+
+
+def tick_entry() -> Callable[[float, Handle], int]:
+    """Return the compiled tick, to be called with the types that it was compiled for.
+
+    Numba looks at the types of all arguments first, which takes as long as a tenth of a tick.
+    """
+    (compiled,) = tick.overloads.values()
+    return compiled.entry_point
+
+
+def compiled_batch() -> float:
+    """Compile the tick for many states or read it from the disk; immediate when that has happened.
+
+    Returns:
+        How long it took, s.
+    """
+    return 0.0 if ticks.signatures else ready("the control tick for many states", first_batch)
+
+
+def first_tick() -> list[tuple[Any, tuple[Any, ...]]]:
+    """Return what is called to have the tick and its report compiled."""
+    return [
+        (tick, (0.0, tick_handle(*_smallest(_axes())))),
+        (spectrum, (np.ones((1, 1)), np.zeros(OPTION_SIZE))),
+    ]
+
+
+def first_batch() -> list[tuple[Any, tuple[Any, ...]]]:
+    """Return what is called to have the tick for many states compiled."""
+    bodies = _one_body()
+    state = np.zeros((1, 1))
+    axes = RigidModel(bodies, {}, ()).motion_axes(make_dynamics(bodies), np.zeros(1), np.zeros(1))
+    before = Remembered(np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros((0, 4)))
+    start = Handle("Remembered", before._asdict())
+    k = tick_handle(*_smallest(axes))
+    return [(ticks, (0.0, k, start, state, state, np.ones((1, 0)), 0, 1, state.copy()))]
+
+
+def ready(what: str, calls: Calls) -> float:
+    """Call compiled functions for the first time, and say so when it takes long.
+
+    Args:
+        what: What they are together, for the announcement.
+        calls: Gives them with their arguments; can be imported by its name.
+
+    Returns:
+        How long it took, s.
+    """
+    start = time.perf_counter()
+    announcement = Timer(PATIENCE, _announce, (what,))
+    announcement.daemon = True
+    announcement.start()
+    try:
+        found = calls()
+        new = not all(is_kept(compiled, arguments) for compiled, arguments in found)
+        if new:
+            compile_apart(calls)
+        for compiled, arguments in found:
+            compiled(*arguments)
+    finally:
+        announcement.cancel()
+    seconds = time.perf_counter() - start
+    if new:
+        log.warning("compiled %s in %.0f s; it is kept for the next start", what, seconds)
+    return seconds
+
+
+def _announce(what: str) -> None:
+    log.warning("compiling %s, once after each installation: half a minute to two", what)
+
+
+def _axes() -> MotionAxes:
+    """Make the arrays of a robot with one joint."""
+    return MotionAxes(
+        q=np.zeros(1),
+        v=np.zeros(1),
+        M=np.ones((1, 1)),
+        bias=np.zeros(1),
+        axes=np.zeros((1, 6)),
+        placement=np.zeros((1, 12)),
+        parent=np.array([-1]),
+        frames={},
+        masses=(),
+    )
+
+
+def _one_body() -> RigidBodies:
+    """Make a body of one kilogram behind one hinge."""
+    two, integers = np.zeros(2), np.int64
+    place = np.zeros((2, 12))
+    place[:, [0, 4, 8]] = 1.0
+    return RigidBodies(
+        kind=np.full(2, ALIGNED, integers),
+        parent=np.zeros(2, integers),
+        place=place,
+        axis=np.array([[0.0, 0.0, 1.0]] * 2),
+        along=np.full(2, 2, integers),
+        first_q=np.zeros(2, integers),
+        first_v=np.zeros(2, integers),
+        width=np.array([0, 1], integers),
+        mass=two + 1.0,
+        centre=np.zeros((2, 3)),
+        tensor=np.ones((2, 6)),
+        before=np.array([-1], integers),
+        armature=np.zeros(1),
+        gravity=np.zeros(3),
+    )
+
+
+def _smallest(axes: MotionAxes) -> tuple[Tick, Space, MotionAxes]:
+    """Make the arrays of a tick for one joint and no task."""
+    size = Sizes(
+        n=1, tasks=0, rows=0, slot_rows=0, slots=0, levels=0, variables=0, limits=0, corners=1
+    )
+    memory, space, _ = make_tick(size, axes, np.ones(1), np.zeros(OPTION_SIZE))
+    return memory, space, axes

@@ -1,0 +1,206 @@
+"""Factorisations of small matrices, rows contiguous, results in the caller's arrays."""
+
+from __future__ import annotations
+
+import math
+
+from opspace.machine.jit import jit
+
+SWEEPS = 30
+"""One-sided Jacobi converges quadratically; six sweeps are usual, this many cannot be needed."""
+
+EPSILON = 2e-15
+
+
+@jit
+def cholesky(A, n, shift, L):
+    """Factor A − shift·I = L Lᵀ into the lower triangle of L, its diagonal inverted.
+
+    Returns:
+        Whether it is positive definite, that is whether every eigenvalue of A is above the shift;
+        otherwise L is not usable.
+    """
+    for i in range(n):
+        for j in range(i + 1):
+            s = A[i, j]
+            if i == j:
+                s -= shift
+            for k in range(j):
+                s -= L[i, k] * L[j, k]
+            if i == j:
+                if not s > 0.0:
+                    return False
+                L[i, i] = 1.0 / math.sqrt(s)
+            else:
+                L[i, j] = s * L[j, j]
+    return True
+
+
+@jit
+def solve_lower(L, n, x):
+    """Overwrite x with L⁻¹ x, for L as `cholesky` leaves it."""
+    for i in range(n):
+        s = x[i]
+        for k in range(i):
+            s -= L[i, k] * x[k]
+        x[i] = s * L[i, i]
+
+
+@jit
+def solve_lower_transposed(L, n, x):
+    """Overwrite x with L⁻ᵀ x, for L as `cholesky` leaves it."""
+    for i in range(n - 1, -1, -1):
+        s = x[i]
+        for k in range(i + 1, n):
+            s -= L[k, i] * x[k]
+        x[i] = s * L[i, i]
+
+
+@jit
+def householder(B, m, r, scale, R):
+    """Factor Bᵀ = Q R for the rows of B (m <= r): each row becomes a reflector, R (m, m) upper.
+
+    Args:
+        B: (m, r) rows on entry; on return row k holds reflector k in its entries k and beyond.
+        m: Number of rows.
+        r: Length of the rows.
+        scale: (m,) filled with 2/‖reflector‖², 0 where nothing is reflected.
+        R: (m, m) filled, upper triangle.
+    """
+    for k in range(m):
+        norm2 = 0.0
+        for a in range(k, r):
+            norm2 += B[k, a] * B[k, a]
+        for i in range(k):
+            R[i, k] = B[k, i]
+        norm = math.sqrt(norm2)
+        if norm == 0.0:
+            scale[k] = 0.0
+            R[k, k] = 0.0
+            continue
+        pivot = B[k, k]
+        alpha = -norm if pivot > 0.0 else norm
+        B[k, k] = pivot - alpha
+        # ‖reflector‖² = 2 ‖row‖ (‖row‖ + |pivot|), which cannot cancel.
+        scale[k] = 1.0 / (norm * (norm + abs(pivot)))
+        R[k, k] = alpha
+        for i in range(k + 1, m):
+            s = 0.0
+            for a in range(k, r):
+                s += B[k, a] * B[i, a]
+            s *= scale[k]
+            for a in range(k, r):
+                B[i, a] -= s * B[k, a]
+
+
+@jit
+def apply_reflectors(B, m, r, scale, x):
+    """Overwrite x (r,) with Q x, Q the product of the reflectors in B."""
+    for k in range(m - 1, -1, -1):
+        s = 0.0
+        for a in range(k, r):
+            s += B[k, a] * x[a]
+        s *= scale[k]
+        for a in range(k, r):
+            x[a] -= s * B[k, a]
+
+
+@jit
+def apply_reflectors_transposed(B, m, r, scale, x):
+    """Overwrite x (r,) with Qᵀ x, Q the product of the reflectors in B."""
+    for k in range(m):
+        s = 0.0
+        for a in range(k, r):
+            s += B[k, a] * x[a]
+        s *= scale[k]
+        for a in range(k, r):
+            x[a] -= s * B[k, a]
+
+
+@jit
+def solve_upper(R, m, x):
+    """Overwrite x (m,) with R⁻¹ x."""
+    for i in range(m - 1, -1, -1):
+        s = x[i]
+        for k in range(i + 1, m):
+            s -= R[i, k] * x[k]
+        x[i] = s / R[i, i]
+
+
+@jit
+def solve_upper_transposed(R, m, x):
+    """Overwrite x (m,) with R⁻ᵀ x."""
+    for i in range(m):
+        s = x[i]
+        for k in range(i):
+            s -= R[k, i] * x[k]
+        x[i] = s / R[i, i]
+
+
+@jit
+def singular_values(C, k, m, Y, s):
+    """Singular value decomposition by one-sided Jacobi rotations, accurate also for small values.
+
+    Args:
+        C: (k, m) the matrix's k columns as rows on entry; on return σ_i times the left vectors.
+        k: Number of columns.
+        m: Number of rows.
+        Y: (k, k) filled with the right vectors as rows, orthonormal whatever the rank is.
+        s: (k,) filled with the singular values, largest first.
+    """
+    for i in range(k):
+        for j in range(k):
+            Y[i, j] = 1.0 if i == j else 0.0
+    for _ in range(SWEEPS):
+        if not _sweep(C, k, m, Y):
+            break
+    for i in range(k):
+        s[i] = math.sqrt(_dot(C, i, i, m))
+    for i in range(k):
+        largest = i
+        for j in range(i + 1, k):
+            if s[j] > s[largest]:
+                largest = j
+        if largest != i:
+            s[i], s[largest] = s[largest], s[i]
+            for a in range(m):
+                C[i, a], C[largest, a] = C[largest, a], C[i, a]
+            for a in range(k):
+                Y[i, a], Y[largest, a] = Y[largest, a], Y[i, a]
+
+
+@jit
+def _sweep(C, k, m, Y):
+    rotated = False
+    for i in range(k - 1):
+        for j in range(i + 1, k):
+            aa, bb, ab = _dot(C, i, i, m), _dot(C, j, j, m), _dot(C, i, j, m)
+            # Columns of zeros need no rotation; below the smallest normal numbers all is noise.
+            if abs(ab) <= EPSILON * math.sqrt(aa * bb) or abs(ab) < 1e-290:
+                continue
+            rotated = True
+            zeta = (bb - aa) / (2.0 * ab)
+            tangent = 1.0 / (abs(zeta) + math.sqrt(1.0 + zeta * zeta))
+            if zeta < 0.0:
+                tangent = -tangent
+            cosine = 1.0 / math.sqrt(1.0 + tangent * tangent)
+            sine = cosine * tangent
+            _rotate(C, i, j, m, cosine, sine)
+            _rotate(Y, i, j, k, cosine, sine)
+    return rotated
+
+
+@jit
+def _dot(C, i, j, m):
+    s = 0.0
+    for a in range(m):
+        s += C[i, a] * C[j, a]
+    return s
+
+
+@jit
+def _rotate(C, i, j, m, cosine, sine):
+    for a in range(m):
+        x, y = C[i, a], C[j, a]
+        C[i, a] = cosine * x - sine * y
+        C[j, a] = sine * x + cosine * y

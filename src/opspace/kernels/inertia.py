@@ -1,0 +1,151 @@
+"""The inertia as U Uᵀ, with zeros where a tree has them.
+
+Eliminated from the tips to the base, the inertia of a tree fills nothing in (Featherstone 2005): row a
+of U has entries only at the coordinates that a carries, which are neighbours. In whitened
+coordinates, û = U⁻¹ Γ and Ĵ = J U⁻ᵀ, rows of different branches have different columns.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from opspace.machine.jit import jit
+from opspace.machine.record import Handle
+
+
+class Inertia(NamedTuple):
+    """Factor of an inertia, and where it is not zero.
+
+    Attributes:
+        U: (n, n) upper triangular, M = U Uᵀ.
+        inverse: (n,) one over its diagonal: a division takes as long as ten products.
+        before: (n,) the coordinate before each one on the way to the base, −1 for none.
+        end: (n,) the coordinate after the last one that each one carries.
+    """
+
+    U: np.ndarray
+    inverse: np.ndarray
+    before: np.ndarray
+    end: np.ndarray
+
+
+def make_inertia(before: np.ndarray) -> Inertia:
+    """Make the memory for the factor of a tree, or of a chain where its branches are not in order."""
+    n = before.size
+    end, carried = np.arange(1, n + 1), np.ones(n, np.int64)
+    for a in range(n - 1, -1, -1):
+        if before[a] >= 0:
+            end[before[a]] = max(end[before[a]], end[a])
+            carried[before[a]] += carried[a]
+    if not np.array_equal(end - np.arange(n), carried):
+        return make_inertia(np.arange(n) - 1)
+    return Inertia(np.zeros((n, n)), np.zeros(n), np.array(before, np.int64), end)
+
+
+def inertia_handle(inertia: Inertia) -> Handle:
+    """Make the handle with which compiled functions reach an `Inertia`."""
+    return Handle("Inertia", inertia._asdict())
+
+
+@jit
+def factor(M, f):
+    """Factor M = U Uᵀ, from the tips to the base.
+
+    Returns:
+        Whether M is positive definite; otherwise U is not usable.
+    """
+    U, inverse, before, end = f.U, f.inverse, f.before, f.end
+    for a in range(U.shape[0] - 1, -1, -1):
+        s = M[a, a]
+        for k in range(a + 1, end[a]):
+            s -= U[a, k] * U[a, k]
+        if not s > 0.0:
+            return False
+        U[a, a] = math.sqrt(s)
+        scale = 1.0 / U[a, a]
+        inverse[a] = scale
+        b = before[a]
+        while b >= 0:
+            s = M[b, a]
+            for k in range(a + 1, end[a]):
+                s -= U[a, k] * U[b, k]
+            U[b, a] = s * scale
+            b = before[b]
+    return True
+
+
+@jit
+def whiten_rows(f, last, first, end, X):
+    """Overwrite rows of Jacobians that move coordinate ``last`` and those before with X U⁻ᵀ."""
+    U, inverse, before = f.U, f.inverse, f.before
+    a = last
+    while a >= 0:
+        # Row by row inside, so that one need not wait for the other.
+        for i in range(first, end):
+            s = X[i, a]
+            for k in range(a + 1, last + 1):
+                s -= U[a, k] * X[i, k]
+            X[i, a] = s * inverse[a]
+        a = before[a]
+
+
+@jit
+def whiten(f, x):
+    """Overwrite any row of a Jacobian with x U⁻ᵀ, and a torque with the whitened one, U⁻¹ x."""
+    U, inverse, end = f.U, f.inverse, f.end
+    for a in range(U.shape[0] - 1, -1, -1):
+        s = x[a]
+        for k in range(a + 1, end[a]):
+            s -= U[a, k] * x[k]
+        x[a] = s * inverse[a]
+
+
+@jit
+def unit_row(f, a, weight, x):
+    """Fill x with the whitened row of a joint: weight · e_aᵀ U⁻ᵀ."""
+    U, inverse, before = f.U, f.inverse, f.before
+    for b in range(x.shape[0]):
+        x[b] = 0.0
+    x[a] = weight * inverse[a]
+    b = before[a]
+    while b >= 0:
+        s = 0.0
+        for k in range(b + 1, a + 1):
+            s -= U[b, k] * x[k]
+        x[b] = s * inverse[b]
+        b = before[b]
+
+
+@jit
+def acceleration_of(f, x):
+    """Overwrite a whitened torque with the acceleration U⁻ᵀ x that it causes."""
+    U, inverse, end = f.U, f.inverse, f.end
+    for a in range(U.shape[0]):
+        x[a] *= inverse[a]
+        for k in range(a + 1, end[a]):
+            x[k] -= U[a, k] * x[a]
+
+
+@jit
+def whitened_of(f, x, out):
+    """Fill out with the whitened torque Uᵀ x of an acceleration."""
+    U, end = f.U, f.end
+    for a in range(U.shape[0]):
+        out[a] = 0.0
+    for a in range(U.shape[0]):
+        for k in range(a, end[a]):
+            out[k] += U[a, k] * x[a]
+
+
+@jit
+def torque_of(f, x, out):
+    """Fill out with the torque U x of a whitened one."""
+    U, end = f.U, f.end
+    for a in range(U.shape[0]):
+        s = 0.0
+        for k in range(a, end[a]):
+            s += U[a, k] * x[k]
+        out[a] = s

@@ -1,0 +1,202 @@
+"""Motion of frames from the joints' motion axes: placement, velocity, Jacobian and drift."""
+
+from __future__ import annotations
+
+from opspace.kernels.columns import (
+    BODY,
+    CENTRE_OF_MASS,
+    JOINT,
+    LOCAL,
+    OFFSET,
+    OTHER_BODY,
+    OTHER_JOINT,
+    OTHER_LOCAL,
+    RELATIVE,
+    SOURCE,
+)
+from opspace.machine.jit import jit
+
+# Columns of Tick.motion: rotation by rows, position, velocity, drift.
+R, P, V, A = 0, 9, 12, 18
+
+
+@jit
+def cross_add(out, i, ax, ay, az, bx, by, bz):
+    """Add a × b to out[i:i + 3]."""
+    out[i] += ay * bz - az * by
+    out[i + 1] += az * bx - ax * bz
+    out[i + 2] += ax * by - ay * bx
+
+
+@jit
+def move_joints(k):
+    """Velocity and drift of the body behind every joint, seen at the origin of the world.
+
+    V_j = V_parent + s_j v_j,  A_j = A_parent + (V_j × s_j) v_j: an axis s_j moves with its body.
+    """
+    axes, velocity, acceleration = k.axes, k.velocity, k.acceleration
+    for j in range(k.v.shape[0]):
+        p = k.parent[j]
+        rate = k.v[j]
+        for i in range(6):
+            velocity[j, i] = axes[j, i] * rate
+            acceleration[j, i] = 0.0
+            if p >= 0:
+                velocity[j, i] += velocity[p, i]
+        vx, vy, vz = velocity[j, 0] * rate, velocity[j, 1] * rate, velocity[j, 2] * rate
+        wx, wy, wz = velocity[j, 3] * rate, velocity[j, 4] * rate, velocity[j, 5] * rate
+        lx, ly, lz = axes[j, 0], axes[j, 1], axes[j, 2]
+        rx, ry, rz = axes[j, 3], axes[j, 4], axes[j, 5]
+        a = acceleration[j]
+        cross_add(a, 0, wx, wy, wz, lx, ly, lz)
+        cross_add(a, 0, vx, vy, vz, rx, ry, rz)
+        cross_add(a, 3, wx, wy, wz, rx, ry, rz)
+        if p >= 0:
+            for i in range(6):
+                a[i] += acceleration[p, i]
+
+
+@jit
+def place_frame(k, i, m, body, joint, local, offset):
+    """Motion of a frame of task i into row m of ``motion``: x, ẋ = J v and J̇ v in world axes."""
+    x, number = k.motion[m], k.numbers[i]
+    for row in range(3):
+        for column in range(3):
+            total = number[local + 3 * column + row]
+            if body >= 0:
+                total = 0.0
+                for c in range(3):
+                    total += k.placement[body, 3 * c + row] * number[local + 3 * column + c]
+            x[R + 3 * row + column] = total
+        total = number[local + 9 + row]
+        if body >= 0:
+            total = k.placement[body, 9 + row]
+            for c in range(3):
+                total += k.placement[body, 3 * c + row] * number[local + 9 + c]
+        x[P + row] = total
+    if offset:
+        for row in range(3):
+            for c in range(3):
+                x[P + row] += x[R + 3 * row + c] * number[OFFSET + c]
+    _rates(k, m, joint, x)
+    _jacobian(k, m, joint, x)
+
+
+@jit
+def _rates(k, m, joint, x):
+    """Velocity v_O + ω × p, and drift a_O + α × p + ω × velocity, of the point p of a body."""
+    for i in range(6):
+        x[V + i] = k.velocity[joint, i] if joint >= 0 else 0.0
+        x[A + i] = k.acceleration[joint, i] if joint >= 0 else 0.0
+    px, py, pz = x[P], x[P + 1], x[P + 2]
+    wx, wy, wz = x[V + 3], x[V + 4], x[V + 5]
+    cross_add(x, V, wx, wy, wz, px, py, pz)
+    cross_add(x, A, x[A + 3], x[A + 4], x[A + 5], px, py, pz)
+    cross_add(x, A, wx, wy, wz, x[V], x[V + 1], x[V + 2])
+
+
+@jit
+def _jacobian(k, m, joint, x):
+    J = k.motion_J[m]
+    for i in range(6):
+        for a in range(k.v.shape[0]):
+            J[i, a] = 0.0
+    px, py, pz = x[P], x[P + 1], x[P + 2]
+    j = joint
+    while j >= 0:
+        lx, ly, lz, wx, wy, wz = k.axes[j]
+        J[0, j] = lx + wy * pz - wz * py
+        J[1, j] = ly + wz * px - wx * pz
+        J[2, j] = lz + wx * py - wy * px
+        J[3, j] = wx
+        J[4, j] = wy
+        J[5, j] = wz
+        j = k.parent[j]
+
+
+@jit
+def measure(k, i):
+    """Motion that task i controls, into row 0 of ``motion`` (`opspace.tasks.motions`)."""
+    kind = k.kind[i]
+    if kind[SOURCE] == CENTRE_OF_MASS:
+        _centre_of_mass(k)
+        return
+    if kind[SOURCE] != RELATIVE:
+        place_frame(k, i, 0, kind[BODY], kind[JOINT], LOCAL, True)
+        return
+    place_frame(k, i, 1, kind[BODY], kind[JOINT], LOCAL, False)
+    place_frame(k, i, 2, kind[OTHER_BODY], kind[OTHER_JOINT], OTHER_LOCAL, False)
+    _relative(k)
+
+
+@jit
+def _relative(k):
+    """Row 1 seen from row 2, in the axes of row 2: see `opspace.tasks.motions.RelativeFrame`."""
+    out, f, r = k.motion[0], k.motion[1], k.motion[2]
+    dx, dy, dz = f[P] - r[P], f[P + 1] - r[P + 1], f[P + 2] - r[P + 2]
+    wx, wy, wz = r[V + 3], r[V + 4], r[V + 5]
+    for i in range(6):
+        out[V + i] = f[V + i] - r[V + i]
+        out[A + i] = f[A + i] - r[A + i]
+    ux, uy, uz = out[V], out[V + 1], out[V + 2]
+    cross_add(out, V, -wx, -wy, -wz, dx, dy, dz)
+    cross_add(out, A, -r[A + 3], -r[A + 4], -r[A + 5], dx, dy, dz)
+    cross_add(out, A, -wx, -wy, -wz, ux + out[V], uy + out[V + 1], uz + out[V + 2])
+    cross_add(out, A + 3, -wx, -wy, -wz, f[V + 3], f[V + 4], f[V + 5])
+    J, Jf, Jr = k.motion_J[0], k.motion_J[1], k.motion_J[2]
+    for a in range(k.v.shape[0]):
+        for i in range(6):
+            J[i, a] = Jf[i, a] - Jr[i, a]
+        J[0, a] -= Jr[4, a] * dz - Jr[5, a] * dy
+        J[1, a] -= Jr[5, a] * dx - Jr[3, a] * dz
+        J[2, a] -= Jr[3, a] * dy - Jr[4, a] * dx
+        _turn_back(r, J[:, a], 0)
+        _turn_back(r, J[:, a], 3)
+    out[P], out[P + 1], out[P + 2] = dx, dy, dz
+    for block in (P, V, V + 3, A, A + 3):
+        _turn_back(r, out, block)
+    for row in range(3):
+        for column in range(3):
+            total = 0.0
+            for c in range(3):
+                total += r[R + 3 * c + row] * f[R + 3 * c + column]
+            out[R + 3 * row + column] = total
+
+
+@jit
+def _turn_back(r, x, i):
+    """x[i:i + 3] ← Rᵀ x[i:i + 3] with R in ``r``."""
+    a, b, c = x[i], x[i + 1], x[i + 2]
+    for row in range(3):
+        x[i + row] = r[R + row] * a + r[R + 3 + row] * b + r[R + 6 + row] * c
+
+
+@jit
+def _centre_of_mass(k):
+    """X = Σ mᵢ cᵢ / Σ mᵢ and its rates, linear rows only."""
+    out, J, part = k.motion[0], k.motion_J[0], k.motion[1]
+    n = k.v.shape[0]
+    for i in range(out.shape[0]):
+        out[i] = 0.0
+    for i in range(3):
+        out[R + 4 * i] = 1.0
+        for a in range(n):
+            J[i, a] = 0.0
+    total = 0.0
+    for link in range(k.mass.shape[0]):
+        total += k.mass[link, 0]
+    for link in range(k.mass.shape[0]):
+        body, joint = k.mass_place[link, 0], k.mass_place[link, 1]
+        weight = k.mass[link, 0] / total
+        for row in range(3):
+            part[P + row] = k.placement[body, 9 + row]
+            for c in range(3):
+                part[P + row] += k.placement[body, 3 * c + row] * k.mass[link, 1 + c]
+        _rates(k, 1, joint, part)
+        _jacobian(k, 1, joint, part)
+        for i in range(3):
+            out[P + i] += weight * part[P + i]
+            out[V + i] += weight * part[V + i]
+            out[A + i] += weight * part[A + i]
+            for a in range(n):
+                J[i, a] += weight * k.motion_J[1, i, a]

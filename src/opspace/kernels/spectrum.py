@@ -1,0 +1,46 @@
+"""The spectrum of a level, for its report."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+
+from opspace.kernels.algebra import singular_values
+from opspace.kernels.columns import SIGMA_LOWER, SIGMA_PROFILE, SIGMA_UPPER, SINGULAR
+from opspace.kernels.profiles import profile
+from opspace.machine.jit import jit
+
+
+@partial(jit, counted=True)
+def spectrum(B, option):
+    """Directions of a level, strongest first: σ, activation, and vectors as columns (Eq. 25)."""
+    m, free = B.shape
+    k = min(m, free)
+    wide = m <= free
+    # The smaller side is decomposed; the vectors of the rows come out on either.
+    C = np.zeros((k, max(m, free)))
+    for i in range(m):
+        for b in range(free):
+            if wide:
+                C[i, b] = B[i, b]
+            else:
+                C[b, i] = B[i, b]
+    Y = np.zeros((k, k))
+    sigma = np.zeros(k)
+    singular_values(C, k, C.shape[1], Y, sigma)
+    directions = np.zeros((m, k))
+    activation = np.ones(k)
+    for i in range(k):
+        for a in range(m):
+            if wide:
+                directions[a, i] = Y[i, a]
+            elif sigma[i] > 0.0:
+                directions[a, i] = C[i, a] / sigma[i]
+        sigma[i] *= sigma[i]
+        if option[SINGULAR] != 0.0:
+            lower, upper = option[SIGMA_LOWER], option[SIGMA_UPPER]
+            activation[i] = profile(
+                int(option[SIGMA_PROFILE]), (sigma[i] - lower) / (upper - lower)
+            )
+    return sigma, activation, directions

@@ -1,0 +1,187 @@
+"""Terms of the built-in tasks: rows J q̈ = f̃ with f̃ = f* − J̇ q̇ (Eq. 3, 24)."""
+
+from __future__ import annotations
+
+import math
+
+from opspace.kernels.columns import (
+    FIRST_ROW,
+    GOAL_ACCELERATION,
+    GOAL_POSITION,
+    GOAL_ROTATION,
+    GOAL_VELOCITY,
+    JOINTS,
+    KIND,
+    MAX_SPEED,
+    MOTION,
+    ORIENTATION,
+    POSE,
+    POSITION,
+    QUANTITY,
+    REMEMBERS,
+    ROWS,
+    SPEED_LIMITED,
+    TOOL_AXES,
+    TURN,
+)
+from opspace.kernels.motion import A, P, R, V, measure, move_joints
+from opspace.law.scalars import BRANCH_HOLD
+from opspace.machine.jit import jit
+
+LONGEST_WAY = math.cos(0.5 * (math.pi + BRANCH_HOLD))
+
+
+@jit
+def evaluate_tasks(k):
+    """Fill J, drift, error and commanded acceleration of the rows of every built-in task."""
+    moved = False
+    for i in range(k.kind.shape[0]):
+        if k.kind[i, KIND] == MOTION:
+            if not moved:
+                move_joints(k)
+                moved = True
+            measure(k, i)
+            _motion_task(k, i)
+        elif k.kind[i, KIND] == JOINTS:
+            _joint_task(k, i)
+
+
+@jit
+def _joint_task(k, i):
+    """f* = a_d + kv (v_d − v) + kp (q_d − q) of the chosen joints."""
+    first, rows = k.kind[i, FIRST_ROW], k.kind[i, ROWS]
+    for row in range(first, first + rows):
+        k.error[row] = k.goal[row, 0] - k.q[k.coordinate[row]]
+        k.drift[row] = 0.0
+    scale = 1.0
+    if k.kind[i, SPEED_LIMITED] != 0:
+        scale = _within_speed(k, first, first + rows, k.numbers[i, MAX_SPEED])
+    for row in range(first, first + rows):
+        rate = k.goal[row, 1] - k.v[k.coordinate[row]]
+        k.wanted[row] = k.goal[row, 2] + k.kv[row] * rate + k.kp[row] * (k.error[row] * scale)
+
+
+@jit
+def _motion_task(k, i):
+    kind, number, x, e = k.kind[i], k.numbers[i], k.motion[0], k.motion_error
+    block, size = 0, 3
+    if kind[QUANTITY] == ORIENTATION:
+        block = 3
+    elif kind[QUANTITY] == POSE:
+        size = 6
+    if kind[QUANTITY] != ORIENTATION:
+        for c in range(3):
+            e[c] = number[GOAL_POSITION + c] - x[P + c]
+    if kind[QUANTITY] != POSITION:
+        _rotation_error(kind, number, x, e, size - 3)
+    first, rows = kind[FIRST_ROW], kind[ROWS]
+    for row in range(first, first + rows):
+        _project(k, i, row, block, size, x, e)
+    _accelerations(k, i, first, rows, size)
+
+
+@jit
+def _project(k, i, row, block, size, x, e):
+    """One task row: the selected combination of the motion's rows, in world or tool axes."""
+    number = k.numbers[i]
+    for a in range(k.v.shape[0]):
+        k.J[row, a] = 0.0
+    error, drift, rate, ahead = 0.0, 0.0, 0.0, 0.0
+    for c in range(size):
+        factor = k.select[row, c]
+        if k.kind[i, TOOL_AXES] != 0:
+            # S Rᵀ: the selected axes of the tool, as combinations of those of the world.
+            factor = 0.0
+            base = 3 * (c // 3)
+            for axis in range(3):
+                factor += k.select[row, base + axis] * x[R + 3 * (c - base) + axis]
+        if factor == 0.0:
+            continue
+        source = block + c
+        for a in range(k.v.shape[0]):
+            k.J[row, a] += factor * k.motion_J[0, source, a]
+        # Tool axes turn with the tool, which takes ω × ẋ from the drift and from the desired
+        # acceleration alike: it cancels in f* − J̇ q̇ and is left out of both.
+        drift += factor * x[A + source]
+        error += factor * e[c]
+        rate += factor * (number[GOAL_VELOCITY + c] - x[V + source])
+        ahead += factor * number[GOAL_ACCELERATION + c]
+    k.error[row] = error
+    k.drift[row] = drift
+    k.wanted[row] = ahead + k.kv[row] * rate
+
+
+@jit
+def _accelerations(k, i, first, rows, size):
+    """Add kp (x_d − x), within the speed that it may ask for."""
+    limited = k.kind[i, SPEED_LIMITED] != 0
+    group = 3 if size == 6 else rows
+    for start in range(first, first + rows, max(group, 1)):
+        scale = 1.0
+        if limited:
+            which = (start - first) // group
+            scale = _within_speed(k, start, start + group, k.numbers[i, MAX_SPEED + which])
+        for row in range(start, start + group):
+            k.wanted[row] += k.kp[row] * (k.error[row] * scale)
+
+
+@jit
+def _within_speed(k, first, end, limit):
+    """Factor on the error with which kp/kv · error is no faster than the limit (Khatib 1987)."""
+    total = 0.0
+    for row in range(first, end):
+        if k.kp[row] > 0.0:
+            asked = k.kp[row] / k.kv[row] * k.error[row]
+            total += asked * asked
+    speed = math.sqrt(total)
+    return limit / speed if speed > limit else 1.0
+
+
+@jit
+def _rotation_error(kind, number, x, e, at):
+    """Rotation vector of R_d Rᵀ, continuous past half a turn (`opspace.tasks.rotation_error`)."""
+    E = (
+        _row(number, x, 0, 0), _row(number, x, 0, 1), _row(number, x, 0, 2),
+        _row(number, x, 1, 0), _row(number, x, 1, 1), _row(number, x, 1, 2),
+        _row(number, x, 2, 0), _row(number, x, 2, 1), _row(number, x, 2, 2),
+    )  # fmt: skip
+    w, a, b, c = _quaternion(E)
+    if kind[REMEMBERS] != 0:
+        agreement = (
+            w * number[TURN] + a * number[TURN + 1] + b * number[TURN + 2] + c * number[TURN + 3]
+        )
+        if agreement < 0.0 and -w >= LONGEST_WAY:
+            w, a, b, c = -w, -a, -b, -c
+    kind[REMEMBERS] = 1
+    number[TURN], number[TURN + 1], number[TURN + 2], number[TURN + 3] = w, a, b, c
+    sine = math.sqrt(a * a + b * b + c * c)
+    scale = 2.0 * math.atan2(sine, w) / sine if sine > 1e-150 else 2.0 / w
+    e[at], e[at + 1], e[at + 2] = scale * a, scale * b, scale * c
+
+
+@jit
+def _row(number, x, i, j):
+    """Entry (i, j) of R_d Rᵀ."""
+    total = 0.0
+    for c in range(3):
+        total += number[GOAL_ROTATION + 3 * i + c] * x[R + 3 * j + c]
+    return total
+
+
+@jit
+def _quaternion(E):
+    """Unit quaternion wxyz of a rotation, w >= 0 (Shepperd 1978)."""
+    r00, r01, r02, r10, r11, r12, r20, r21, r22 = E
+    trace = r00 + r11 + r22
+    if trace >= r00 and trace >= r11 and trace >= r22:
+        w, x, y, z = 1.0 + trace, r21 - r12, r02 - r20, r10 - r01
+    elif r00 >= r11 and r00 >= r22:
+        w, x, y, z = r21 - r12, 1.0 + r00 - r11 - r22, r01 + r10, r02 + r20
+    elif r11 >= r22:
+        w, x, y, z = r02 - r20, r01 + r10, 1.0 - r00 + r11 - r22, r12 + r21
+    else:
+        w, x, y, z = r10 - r01, r02 + r20, r12 + r21, 1.0 - r00 - r11 + r22
+    norm = math.sqrt(w * w + x * x + y * y + z * z)
+    if w < 0.0:
+        norm = -norm
+    return w / norm, x / norm, y / norm, z / norm

@@ -1,0 +1,40 @@
+"""What the loop needs of a robot, simulated or real."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+
+
+class Plant(Protocol):
+    """A robot that is read, and driven by joint torque.
+
+    Attributes:
+        dt: Time between two ticks, s.
+    """
+
+    dt: float
+
+    @property
+    def t(self) -> float:
+        """Time, s."""
+        ...
+
+    @property
+    def q(self) -> np.ndarray:
+        """Configuration as it is, (nq,)."""
+        ...
+
+    @property
+    def v(self) -> np.ndarray:
+        """Velocity as it is, (n,), rad/s."""
+        ...
+
+    def measure(self) -> tuple[np.ndarray, np.ndarray]:
+        """Read the sensors: configuration (nq,) and velocity (n,)."""
+        ...
+
+    def advance(self, tau: np.ndarray) -> None:
+        """Hold a joint torque, (n,) N·m, until the next tick."""
+        ...

@@ -1,0 +1,1 @@
+"""Objects to arrays: the one entrance for everything that runs compiled."""

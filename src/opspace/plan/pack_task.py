@@ -1,0 +1,226 @@
+"""Tasks as rows of numbers, repacked only when somebody changes them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from opspace.errors import InputError
+from opspace.kernels.columns import (
+    BODY,
+    CENTRE_OF_MASS,
+    COVERS_ALL,
+    FIRST_ROW,
+    GOAL_ACCELERATION,
+    GOAL_POSITION,
+    GOAL_ROTATION,
+    GOAL_VELOCITY,
+    JOINT,
+    JOINTS,
+    KIND,
+    KIND_SIZE,
+    LOCAL,
+    MAX_SPEED,
+    MOTION,
+    NUMBERS_SIZE,
+    OFFSET,
+    ORIENTATION,
+    OTHER_BODY,
+    OTHER_JOINT,
+    OTHER_LOCAL,
+    OWN,
+    POSE,
+    POSITION,
+    QUANTITY,
+    RELATIVE,
+    REMEMBERS,
+    ROWS,
+    SOURCE,
+    SPEED_LIMITED,
+    TOOL_AXES,
+    TURN,
+    WORLD,
+    Tick,
+)
+from opspace.robots.adapter import AdapterBase
+from opspace.robots.motion_axes import FramePlace, MotionAxes
+from opspace.stack import Member
+from opspace.tasks import PostureTask, Task
+from opspace.tasks.activations import own_activation
+from opspace.tasks.motion_task import MotionTask
+from opspace.tasks.motions import CenterOfMass, RelativeFrame, WorldFrame
+from opspace.tasks.quantities import Orientation, Pose, Position
+
+QUANTITIES = {Position: POSITION, Orientation: ORIENTATION, Pose: POSE}
+SOURCES = {WorldFrame: WORLD, RelativeFrame: RELATIVE, CenterOfMass: CENTRE_OF_MASS}
+
+
+def kind_of(task: Task) -> int:
+    """Tell whether a task is one that the compiled tick evaluates, and which."""
+    method = type(task).evaluate
+    if isinstance(task, MotionTask) and method is MotionTask.evaluate:
+        known = type(task.source) in SOURCES and type(task.quantity) in QUANTITIES
+        return MOTION if known else OWN
+    if isinstance(task, PostureTask) and method is PostureTask.evaluate:
+        return JOINTS
+    return OWN
+
+
+class Packed:
+    """One task in the arrays of a plan.
+
+    Args:
+        member: The task in its stack.
+        index: Its row in ``kind`` and ``numbers``.
+        first: Its first row among those of all tasks.
+        axes: The robot's arrays.
+        tick: The arrays of the plan.
+    """
+
+    def __init__(
+        self, member: Member, index: int, first: int, axes: MotionAxes, tick: Tick
+    ) -> None:
+        task = member.task
+        self.member = member
+        self.task: Any = task
+        self.index = index
+        self.rows = slice(first, first + task.rows)
+        self.own_kind = kind_of(task) == OWN
+        self.moving = True
+        self._timed = False
+        self._own_activation = False
+        self._tick = tick
+        self.target: object = None
+        self.held: object = None
+        self.gains: object = None
+        kind = tick.kind[index]
+        kind[:] = np.zeros(KIND_SIZE)
+        kind[[KIND, FIRST_ROW, ROWS]] = kind_of(task), first, task.rows
+        covers = isinstance(task, PostureTask) and task.rows == axes.v.size
+        kind[COVERS_ALL] = int(covers)
+        tick.numbers[index] = np.zeros(NUMBERS_SIZE)
+        if kind[KIND] == MOTION:
+            self._pack_source(axes)
+        elif kind[KIND] == JOINTS:
+            tick.coordinate[self.rows] = self.task.layout.coordinates
+
+    def refresh(self, robot: AdapterBase, t: float) -> None:
+        """Bring the arrays up to date with the task at time ``t`` [s].
+
+        Args:
+            robot: The robot at the present state.
+            t: Time, s.
+
+        Raises:
+            InputError: A reference or a task of the user's own gave unusable numbers.
+        """
+        task = self.task
+        if task.activation is not None:
+            robot.check_state(robot.q, robot.v)
+            self._tick.own[self.index] = own_activation(task, robot, t)
+            self._own_activation = True
+        elif self._own_activation:
+            self._tick.own[self.index] = 1.0
+            self._own_activation = False
+        if self.own_kind:
+            self._evaluate(robot, t)
+        elif (
+            self._timed
+            or task._target is not self.target
+            or task._held is not self.held
+            or task._gains is not self.gains
+        ):
+            self._pack(robot, t)
+        # A class may decide anew at every tick what its tasks have, or tell nobody of changes.
+        kind = type(task)
+        silent = kind.activation is not None or kind.__setattr__ is not Task.__setattr__
+        self.moving = self.own_kind or self._timed or self._own_activation or silent
+
+    def remember(self, before: Packed) -> None:
+        """Go on from the same task in the plan before: which way round a rotation went."""
+        self._tick.kind[self.index, REMEMBERS] = before._tick.kind[before.index, REMEMBERS]
+        turn = slice(TURN, TURN + 4)
+        self._tick.numbers[self.index, turn] = before._tick.numbers[before.index, turn]
+
+    def _evaluate(self, robot: AdapterBase, t: float) -> None:
+        tick, rows = self._tick, self.rows
+        robot.check_state(robot.q, robot.v)
+        terms = self.task.evaluate(robot, t)
+        for given, array in (
+            (terms.J, tick.J),
+            (terms.drift, tick.drift),
+            (terms.acceleration, tick.wanted),
+            (terms.error, tick.error),
+        ):
+            array[rows] = self._checked(given, array[rows].shape, t)
+
+    def _checked(self, given: object, shape: tuple[int, ...], t: float) -> np.ndarray:
+        found = np.asarray(given, dtype=float)
+        if found.shape == shape and np.isfinite(found).all():
+            return found
+        raise InputError(
+            f"task {self.task.name!r}: its terms at t = {t:.6g} s must be finite, of shape {shape}, "
+            f"got shape {found.shape}"
+            f"{'' if np.isfinite(found).all() else ' with numbers that are not finite'}"
+        )
+
+    def _pack(self, robot: AdapterBase, t: float) -> None:
+        task, tick, rows = self.task, self._tick, self.rows
+        target = task._target
+        if not self._timed:  # it may hold what it finds
+            robot.check_state(robot.q, robot.v)
+        gains = task._gains
+        desired = task.desired(robot, t)
+        if gains is not self.gains:
+            tick.kp[rows], tick.kv[rows] = gains.kp, gains.kv
+            limited = gains.max_speed is not None
+            tick.kind[self.index, SPEED_LIMITED] = int(limited)
+            if limited:
+                most = slice(MAX_SPEED, MAX_SPEED + len(gains.max_speed))
+                tick.numbers[self.index, most] = gains.max_speed
+        if tick.kind[self.index, KIND] == JOINTS:
+            tick.goal[rows, 0], tick.goal[rows, 1], tick.goal[rows, 2] = desired
+        else:
+            self._pack_goal(desired)
+        self.target, self.held, self.gains = target, task._held, gains
+        self._timed = callable(target.goal)
+
+    def _pack_goal(self, desired: Any) -> None:
+        number, quantity = self._tick.numbers[self.index], self._tick.kind[self.index, QUANTITY]
+        size = len(desired.v)
+        number[GOAL_VELOCITY : GOAL_VELOCITY + size] = desired.v
+        number[GOAL_ACCELERATION : GOAL_ACCELERATION + size] = desired.a
+        rotation = slice(GOAL_ROTATION, GOAL_ROTATION + 9)
+        position = slice(GOAL_POSITION, GOAL_POSITION + 3)
+        if quantity == POSITION:
+            number[position] = desired.x
+        elif quantity == ORIENTATION:
+            number[rotation] = desired.x.reshape(9)
+        else:
+            number[rotation] = desired.x[:3, :3].reshape(9)
+            number[position] = desired.x[:3, 3]
+
+    def _pack_source(self, axes: MotionAxes) -> None:
+        task, kind = self.task, self._tick.kind[self.index]
+        number = self._tick.numbers[self.index]
+        source = task.source
+        kind[SOURCE] = SOURCES[type(source)]
+        kind[QUANTITY] = QUANTITIES[type(task.quantity)]
+        kind[TOOL_AXES] = int(task.in_tool_axes)
+        selection = task.selection
+        self._tick.select[self.rows] = 0.0
+        self._tick.select[self.rows, : selection.shape[1]] = selection
+        if isinstance(source, WorldFrame):
+            self._pack_frame(axes.frames[source.id], BODY, JOINT, LOCAL)
+            if source.offset is not None:
+                number[OFFSET : OFFSET + 3] = source.offset
+        elif isinstance(source, RelativeFrame):
+            frame, other = source.ids
+            self._pack_frame(axes.frames[frame], BODY, JOINT, LOCAL)
+            self._pack_frame(axes.frames[other], OTHER_BODY, OTHER_JOINT, OTHER_LOCAL)
+
+    def _pack_frame(self, place: FramePlace, body: int, joint: int, local: int) -> None:
+        kind = self._tick.kind[self.index]
+        kind[body], kind[joint] = place.body, place.joint
+        self._tick.numbers[self.index, local : local + 12] = place.local

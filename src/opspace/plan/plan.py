@@ -1,0 +1,206 @@
+"""A stack between two changes, laid out for the compiled tick."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from opspace.kernels.columns import (
+    ADMISSIBLE,
+    BUFFER,
+    LIMIT_BUFFER,
+    LIMIT_K1,
+    LIMIT_K2,
+    LIMIT_KP,
+    LIMIT_MODE,
+    LIMIT_PROFILE,
+    LIMIT_RETURN_SPEED,
+    LIMIT_WEIGHT,
+    Tick,
+)
+from opspace.kernels.limit_rows import DISTURBANCE, SIGN, SPEED
+from opspace.kernels.profiles import PROFILE_CODE
+from opspace.plan.memory import Sizes, make_tick, tick_handle
+from opspace.plan.pack_task import Packed
+from opspace.plan.scales import Scales
+from opspace.robots.adapter import AdapterBase
+from opspace.robots.motion_axes import MotionAxes
+from opspace.stack import Member, Variable
+from opspace.tasks import JointLimits
+from opspace.tasks.joint_limits import RETURN_SPEED
+from opspace.tasks.task import CHANGES
+
+MOST = 62
+"""Bits of a corner: more tasks, places or activations than this take the readable tick."""
+
+
+class Plan:
+    """The arrays of one set of tasks and transitions; any change makes another plan.
+
+    Args:
+        members: The tasks.
+        axes: The robot's arrays.
+        scales: What σ is measured in.
+        limits: Joint limits, or None.
+        torque_limit: (n,) what the motors give, N·m.
+        options: Numbers of the controller's options, (OPTION_SIZE,).
+        room: How many activations are blended exactly.
+    """
+
+    def __init__(
+        self,
+        members: tuple[Member, ...],
+        axes: MotionAxes,
+        scales: Scales,
+        limits: JointLimits | None,
+        torque_limit: np.ndarray,
+        options: np.ndarray,
+        room: int,
+    ) -> None:
+        self.members = members
+        self.axes = axes
+        self.limits = limits
+        self.n = axes.v.size
+        self.variables: list[Member | Variable] = [*members, *_arrivals(members)]
+        self.levels = sorted({place.level for m in members for place in m.places})
+        self.places = sorted(
+            ((p.level, i, k) for i, m in enumerate(members) for k, p in enumerate(m.places)),
+            key=lambda place: place[:2],
+        )
+        self.size = Sizes(
+            n=axes.v.size,
+            tasks=len(members),
+            rows=sum(member.task.rows for member in members),
+            slot_rows=sum(members[i].task.rows for _, i, _ in self.places),
+            slots=len(self.places),
+            levels=len(self.levels),
+            variables=len(self.variables),
+            limits=0 if limits is None else len(limits.sides),
+            corners=_most_corners(len(self.variables), room),
+        )
+        self.tick, space, self.memory = make_tick(self.size, axes, torque_limit, options)
+        self.seen: object = None
+        self.moving = False
+        self.packed = self._pack(scales)
+        self._pack_variables()
+        self._pack_slots()
+        self.first_kept = space.first_kept
+        depth, rows = self.tick.slots[:, 0], self.tick.slots[:, 2]
+        self.first_kept[:] = [rows[depth < d].sum() for d in range(self.first_kept.size)]
+        if limits is not None:
+            _pack_limits(limits, scales, self.tick)
+        self.handle = tick_handle(self.tick, space, axes)
+
+    @staticmethod
+    def fits(members: Sequence[Member]) -> bool:
+        """Tell whether the bit sets are wide enough."""
+        places = sum(len(member.places) for member in members)
+        return len(members) + places <= MOST
+
+    def refresh(self, robot: AdapterBase, t: float) -> None:
+        """Bring targets, gains, and what users compute themselves up to date.
+
+        Nothing is to be done while ``seen`` is the last change there was and nothing is ``moving``.
+
+        Args:
+            robot: The robot at the present state.
+            t: Time, s.
+
+        Raises:
+            InputError: A reference, activation or task gave unusable numbers.
+        """
+        last = CHANGES.last  # before the look at the tasks: what changes meanwhile is seen next
+        for packed in self.packed:
+            packed.refresh(robot, t)
+        self.moving = any(packed.moving for packed in self.packed)
+        self.seen = last
+
+    def disturb(self, acceleration: np.ndarray) -> None:
+        """Tell the joint limits what comes on top of the commanded accelerations, (n,) rad/s²."""
+        tick = self.tick
+        tick.limit[:, DISTURBANCE] = tick.limit[:, SIGN] * acceleration[tick.limit_joint]
+
+    def go_on_from(self, before: Plan) -> None:
+        """Keep what the plan before remembers: groups of the blend, turns of rotations."""
+        groups = dict(zip(map(id, before.variables), before.tick.group.tolist(), strict=True))
+        self.tick.group[:] = [groups.get(id(v), 0) for v in self.variables]
+        known = {id(packed.member): packed for packed in before.packed}
+        for packed in self.packed:
+            if id(packed.member) in known:
+                packed.remember(known[id(packed.member)])
+
+    def _pack(self, scales: Scales) -> list[Packed]:
+        packed: list[Packed] = []
+        first = 0
+        for i, member in enumerate(self.members):
+            entry = Packed(member, i, first, self.axes, self.tick)
+            self.tick.row_weight[entry.rows] = 1.0 / np.sqrt(scales.reference(member.task))
+            first = entry.rows.stop
+            packed.append(entry)
+        return packed
+
+    def _pack_variables(self) -> None:
+        for row, variable in zip(self.tick.variable, self.variables, strict=True):
+            ramp = (variable.presence if isinstance(variable, Member) else variable).ramp
+            row[:] = (
+                PROFILE_CODE[ramp.profile],
+                ramp.target,
+                ramp.start_time,
+                ramp.duration,
+                ramp.phase,
+                ramp.rate,
+                ramp.acceleration,
+                ramp.blend_time,
+                ramp.cruise,
+            )
+
+    def _pack_slots(self) -> None:
+        tick = self.tick
+        index = {id(v): i for i, v in enumerate(self.variables)}
+        rank = {level: k for k, level in enumerate(self.levels)}
+        for s, (level, i, k) in enumerate(self.places):
+            member, packed = self.members[i], self.packed[i]
+            place = member.places[k]
+            chosen = 0 if place.arrival is None else 1 << index[id(place.arrival)]
+            later = [p.arrival for p in member.places[k + 1 :]]
+            tick.slots[s] = rank[level] + 1, packed.rows.start, member.task.rows
+            tick.slot_place[s] = chosen
+            tick.slot_on[s] = chosen | 1 << i
+            tick.slot_off[s] = sum({1 << index[id(arrival)] for arrival in later})
+
+
+def _most_corners(variables: int, room: int) -> int:
+    """Corners if everything moves: any task may be given an activation of its own at any time."""
+    exact = min(variables, room)
+    return 2**exact * (variables - exact + 1)
+
+
+def _arrivals(members: Sequence[Member]) -> list[Variable]:
+    """List the activations that move tasks between places, each once."""
+    found: dict[int, Variable] = {}
+    for member in members:
+        for place in member.places:
+            if place.arrival is not None:
+                found.setdefault(id(place.arrival), place.arrival)
+    return list(found.values())
+
+
+def _pack_limits(limits: JointLimits, scales: Scales, tick: Tick) -> None:
+    for i, side in enumerate(limits.sides):
+        tick.limit_joint[i] = side.index
+        tick.limit[i, : SPEED + 1] = (
+            side.sign,
+            side.limit,
+            side.brake,
+            limits.margin(side),
+            0.0,
+            side.speed,
+        )
+    option = tick.option
+    option[LIMIT_MODE] = BUFFER if limits.mode == "buffer" else ADMISSIBLE
+    option[LIMIT_PROFILE] = PROFILE_CODE[limits.profile]
+    option[LIMIT_WEIGHT] = 1.0 / np.sqrt(scales.joint)
+    option[[LIMIT_K1, LIMIT_K2, LIMIT_KP]] = limits.k1, limits.k2, limits.kp
+    option[LIMIT_RETURN_SPEED] = RETURN_SPEED
+    option[LIMIT_BUFFER] = limits.buffer

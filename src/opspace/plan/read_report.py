@@ -1,0 +1,111 @@
+"""What a compiled tick tells, worked out when somebody asks."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from opspace.command import LevelStatus, TaskStatus
+from opspace.kernels.spectrum import spectrum
+from opspace.kernels.walk import slot_bit
+from opspace.plan.memory import Block, reported
+
+if TYPE_CHECKING:
+    from opspace.plan.plan import Plan
+
+
+class CompiledReport:
+    """Tasks, levels and limits of one tick.
+
+    Args:
+        plan: The plan of the tick.
+        memory: The bytes of the block that the tick wrote.
+    """
+
+    __slots__ = ("_levels", "_memory", "_parts", "_plan", "_tasks")
+
+    def __init__(self, plan: Plan, memory: bytes) -> None:
+        self._plan = plan
+        self._memory = memory
+        self._parts: dict[str, np.ndarray] | None = None
+        self._tasks: dict[str, TaskStatus] | None = None
+        self._levels: tuple[LevelStatus, ...] | None = None
+
+    @property
+    def tasks(self) -> Mapping[str, TaskStatus]:
+        """Status of each task by name."""
+        if self._tasks is None:
+            self._tasks = self._task_status()
+        return self._tasks
+
+    @property
+    def levels(self) -> tuple[LevelStatus, ...]:
+        """Status of each level where there is a task, most important first."""
+        if self._levels is None:
+            self._levels = self._level_status()
+        return self._levels
+
+    @property
+    def limits(self) -> Mapping[str, float]:
+        """Activation of the joint limits that take part, by name."""
+        limits = self._plan.limits
+        if limits is None:
+            return {}
+        found = self._found()["limit_h"].tolist()
+        return {side.name: h for side, h in zip(limits.sides, found, strict=True) if h > 0.0}
+
+    def _task_status(self) -> dict[str, TaskStatus]:
+        plan, found = self._plan, self._found()
+        shares: list[dict[float, float]] = [{} for _ in plan.members]
+        for (level, i, _), share in zip(plan.places, found["share"].tolist(), strict=True):
+            if share > 0.0:
+                shares[i][level] = shares[i].get(level, 0.0) + share
+        status: dict[str, TaskStatus] = {}
+        for packed, levels, h in zip(plan.packed, shares, found["h"].tolist(), strict=True):
+            error = found["error"][packed.rows].copy()
+            norm = float(np.sqrt(error @ error))
+            status[packed.task.name] = TaskStatus(h, tuple(sorted(levels.items())), error, norm)
+        return status
+
+    def _level_status(self) -> tuple[LevelStatus, ...]:
+        plan, found = self._plan, self._found()
+        there = {
+            place[0]
+            for place, share in zip(plan.places, found["share"].tolist(), strict=True)
+            if share > 0.0
+        }
+        return tuple(
+            self._level(found, rank, level)
+            for rank, level in enumerate(plan.levels)
+            if level in there
+        )
+
+    def _found(self) -> dict[str, np.ndarray]:
+        if self._parts is None:
+            block = Block(0)
+            block.memory = np.frombuffer(self._memory)
+            self._parts = reported(self._plan.size, block)
+        return self._parts
+
+    def _level(self, found: dict[str, np.ndarray], rank: int, level: float) -> LevelStatus:
+        plan = self._plan
+        depth = rank + 1
+        scale = float(found["scale"][depth])
+        here = [s for s, place in enumerate(plan.places) if place[0] == level]
+        if found["top"][depth] <= 0.0:
+            shown = [s for s in here if found["share"][s] > 0.0]
+            members = [plan.members[plan.places[s][1]] for s in shown]
+            rows = sum(member.task.rows for member in members)
+            empty = np.zeros(0)
+            names = tuple(member.task.name for member in members)
+            return LevelStatus(level, names, empty, empty, np.zeros((rows, 0)), scale)
+        chosen = int(found["chosen"][depth])
+        present = [s for s in here if chosen & slot_bit.py_func(s)]
+        packed = [plan.packed[plan.places[s][1]] for s in present]
+        first, rows = int(plan.first_kept[depth]), sum(p.task.rows for p in packed)
+        B = found["kept"][first : first + rows, : int(found["width"][depth])]
+        sigma, activation, directions = spectrum(np.array(B), plan.tick.option)
+        names = tuple(p.task.name for p in packed)
+        return LevelStatus(level, names, sigma, activation, directions, scale)

@@ -1,0 +1,131 @@
+"""Options of the controller, and what they mean for a robot and its tasks."""
+
+from __future__ import annotations
+
+import weakref
+from dataclasses import dataclass
+
+import numpy as np
+
+from opspace.errors import InputError, unknown_name
+from opspace.law import SigmaBuffer
+from opspace.plan.calibration import Calibration, Workspace
+from opspace.robots.protocol import Robot
+from opspace.tasks import JointTask, PostureTask, Task
+
+
+@dataclass(frozen=True)
+class Singularity:
+    """How directions that the robot is about to lose are faded out (Section 4.1).
+
+    With ``scale="relative"`` the eigenvalues σ of Eq. 25 are multiples of what is usual for the
+    task on this robot: the median over the workspace of the smallest eigenvalue of its own Λ⁻¹,
+    separately for rows in metres and in radians. One default then serves every robot. With
+    ``scale="absolute"`` they are in 1/kg and 1/(kg·m²), as in the paper.
+
+    Args:
+        lower: σ at and below which a direction is absent.
+        upper: σ at and above which a direction is fully active.
+        scale: ``"relative"`` or ``"absolute"``.
+        profile: Name of the activation profile.
+
+    Raises:
+        InputError: Not 0 < lower < upper.
+        UnknownNameError: An unknown scale or profile.
+    """
+
+    lower: float = 0.1
+    upper: float = 0.6
+    scale: str = "relative"
+    profile: str = "quintic"
+
+    def __post_init__(self) -> None:
+        SigmaBuffer(self.lower, self.upper, self.profile)
+        if self.scale not in ("relative", "absolute"):
+            raise unknown_name("scale", self.scale, ("relative", "absolute"))
+
+
+DEFAULT_SINGULARITY = Singularity()
+
+
+class Scales:
+    """What σ is measured in: one reference per task row, the same whenever the task is prepared.
+
+    Args:
+        robot: The robot of the controller.
+        option: How singular directions are faded out, None for not at all.
+    """
+
+    def __init__(self, robot: Robot, option: Singularity | None) -> None:
+        self._robot = robot
+        self._option = option
+        self._workspace = Workspace(robot)
+        self._known: dict[int, tuple[weakref.ref[Task], np.ndarray, np.ndarray]] = {}
+        self.buffer: SigmaBuffer | None = None
+        # Rows of Lᵀ have σ = 1 in whatever is left; this puts them above any buffer.
+        self.joint, self.unit = 1.0, 1.0
+        if option is not None:
+            self.buffer = SigmaBuffer(option.lower, option.upper, option.profile)
+            # A⁻¹ has no eigenvalue below joint_sigma: joint rows scaled like this are never
+            # singular.
+            self.joint = 0.5 * self._workspace.joint_sigma / option.upper
+            self.unit = 0.5 / option.upper
+
+    def prepare(self, task: Task) -> None:
+        """Bind a task and its activation to the robot, and find its scale where that is not known yet.
+
+        Args:
+            task: A task that no tick is using.
+
+        Raises:
+            InputError: It does not fit the robot.
+            UnknownNameError: It names what the robot does not have.
+        """
+        if self._find(task) is None:
+            workspace = self._workspace.reference(task)
+            task.reset()
+            entry = (weakref.ref(task), workspace, self._scale(task, workspace))
+            alive = {k: v for k, v in self._known.items() if v[0]() is not None}
+            # Replaced as a whole, because a tick in another thread may be reading it.
+            self._known = {**alive, id(task): entry}
+        task.bind(self._robot)
+        bind = getattr(task.activation, "bind", None)
+        if bind is not None:
+            bind(self._robot)
+
+    def reference(self, task: Task) -> np.ndarray:
+        """Return the reference of a prepared task's rows, (m,).
+
+        Raises:
+            InputError: It is not prepared.
+        """
+        found = self._find(task)
+        if found is None:
+            raise InputError(
+                f"task {task.name!r} was not prepared for this controller: a stack belongs to one "
+                "controller, the last one that was built with it"
+            )
+        return found[1]
+
+    def calibration(self, tasks: list[Task]) -> Calibration:
+        """Return the scales of the robot and of prepared tasks."""
+        found = {task.name: self._find(task) for task in tasks}
+        return Calibration(
+            self._workspace.brake,
+            self._workspace.joint_sigma,
+            {name: scales[0] for name, scales in found.items() if scales is not None},
+        )
+
+    def _find(self, task: Task) -> tuple[np.ndarray, np.ndarray] | None:
+        # By identity: a task of one's own need not be hashable.
+        entry = self._known.get(id(task))
+        return entry[1:] if entry is not None and entry[0]() is task else None
+
+    def _scale(self, task: Task, workspace: np.ndarray) -> np.ndarray:
+        if self._option is None:
+            return np.ones(task.rows)
+        if isinstance(task, PostureTask | JointTask):
+            return np.full(task.rows, self.joint)
+        if self._option.scale == "absolute":
+            return np.ones(task.rows)
+        return workspace

@@ -1,0 +1,1 @@
+"""What is done with scenarios: run, watch, reproduce, check, replay."""

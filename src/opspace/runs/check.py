@@ -1,0 +1,190 @@
+"""What the controller will see of a robot, before anything moves."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from opspace.controller import Controller
+from opspace.errors import InputError
+from opspace.plan.calibration import BRAKE_RANGE, Calibration
+from opspace.plan.scales import Singularity
+from opspace.robots.protocol import Robot
+from opspace.stack import Stack
+from opspace.tasks import OrientationTask, PositionTask, Task
+
+NEAR_LIMIT = 0.1
+"""A reference posture closer to a joint limit than this is reported, rad or m."""
+
+
+@dataclass(frozen=True)
+class JointReport:
+    """One joint as the controller sees it; None where the file does not say.
+
+    Attributes:
+        name: Its name.
+        reference: Position in the reference posture, rad or m.
+        lower: Lower limit, rad or m.
+        upper: Upper limit, rad or m.
+        max_velocity: rad/s or m/s.
+        max_torque: N·m or N.
+        gravity: Torque that holds the reference posture, N·m or N.
+        brake: Acceleration with which joint limits count on braking, rad/s² or m/s².
+    """
+
+    name: str
+    reference: float
+    lower: float | None
+    upper: float | None
+    max_velocity: float | None
+    max_torque: float | None
+    gravity: float
+    brake: float | None
+
+
+@dataclass(frozen=True)
+class Report:
+    """A robot as the controller sees it.
+
+    Attributes:
+        robot: Its name.
+        source: Its file.
+        dof: Number of velocity coordinates.
+        tool: Default tool frame.
+        joints: Its joints; those of a floating base are left out.
+        sigma: Eigenvalues of J M⁻¹ Jᵀ at the reference posture by task, strongest first, as
+            multiples of what is usual in the workspace.
+        scale: That mean by task, 1/kg or 1/(kg·m²).
+        buffer: Multiples at which directions are absent and fully active.
+        warnings: What deserves a look.
+    """
+
+    robot: str
+    source: str
+    dof: int
+    tool: str
+    joints: tuple[JointReport, ...]
+    sigma: dict[str, tuple[float, ...]]
+    scale: dict[str, float]
+    buffer: tuple[float, float]
+    warnings: tuple[str, ...]
+
+
+def check_robot(robot: Robot) -> Report:
+    """Ask a controller with default settings what it makes of a robot.
+
+    Args:
+        robot: The robot; its state is changed.
+
+    Returns:
+        The report.
+    """
+    option = Singularity()
+    sigma: dict[str, tuple[float, ...]] = {}
+    scale: dict[str, float] = {}
+    warnings: list[str] = []
+    calibration = None
+    for task in (OrientationTask(), PositionTask()):
+        try:
+            controller = Controller(robot, Stack([task]), singularity=option)
+        except InputError as error:
+            warnings.append(str(error))
+            break
+        calibration = controller.calibration
+        sigma[task.name] = _sigma(controller)
+        scale[task.name] = float(calibration.references[task.name][0])
+        warnings += _singular(task, sigma[task.name], option)
+    robot.update(robot.q_reference, np.zeros(robot.nv))
+    joints = _joints(robot, calibration)
+    return Report(
+        robot=robot.name,
+        source=str(robot.source),
+        dof=robot.nv,
+        tool=robot.tool,
+        joints=joints,
+        sigma=sigma,
+        scale=scale,
+        buffer=(option.lower, option.upper),
+        warnings=(*warnings, *_joint_warnings(joints)),
+    )
+
+
+def to_plain(report: Report) -> dict[str, Any]:
+    """Write a report in JSON's types.
+
+    Args:
+        report: The report.
+
+    Returns:
+        The same, with null for what is not known.
+    """
+    return asdict(report)
+
+
+def _sigma(controller: Controller) -> tuple[float, ...]:
+    robot = controller.robot
+    (level,) = controller.step(0.0, robot.q_reference, np.zeros(robot.nv)).levels
+    return tuple(level.sigma.tolist())
+
+
+def _joints(robot: Robot, calibration: Calibration | None) -> tuple[JointReport, ...]:
+    base = robot.nq - int(np.sum(robot.actuated))
+    reference = robot.q_reference[base:]
+    found = []
+    for place, i in enumerate(np.flatnonzero(robot.actuated)):
+        found.append(
+            JointReport(
+                name=robot.joint_names[i],
+                reference=float(reference[place]),
+                lower=_known(robot.q_lower[i]),
+                upper=_known(robot.q_upper[i]),
+                max_velocity=_known(robot.velocity_limit[i]),
+                max_torque=_known(robot.torque_limit[i]),
+                gravity=float(robot.gravity[i]),
+                brake=None if calibration is None else float(calibration.brake[i]),
+            )
+        )
+    return tuple(found)
+
+
+def _known(value: float) -> float | None:
+    return float(value) if math.isfinite(value) else None
+
+
+def _singular(task: Task, sigma: tuple[float, ...], option: Singularity) -> list[str]:
+    missing = task.rows - len(sigma)
+    if missing > 0:
+        return [f"{missing} of {task.rows} directions of the {task.name} cannot be moved at all"]
+    if sigma[-1] < option.upper:
+        return [
+            f"the reference posture is near a singularity of the {task.name}: the weakest "
+            f"eigenvalue {sigma[-1]:.3g} lies inside the buffer, below {option.upper:g}"
+        ]
+    return []
+
+
+def _joint_warnings(joints: tuple[JointReport, ...]) -> list[str]:
+    def named(found: list[JointReport]) -> str:
+        return ", ".join(joint.name for joint in found)
+
+    unknown = [j for j in joints if j.max_torque is None]
+    near = [j for j in joints if _room(j) < NEAR_LIMIT]
+    weak = [j for j in joints if j.max_torque is not None and abs(j.gravity) > j.max_torque]
+    slow = [j for j in joints if j.brake == BRAKE_RANGE[0]]
+    checks = [
+        (unknown, "no torque limit is known for {}; nothing keeps their torque in bounds"),
+        (near, f"the reference posture is within {NEAR_LIMIT:g} of a limit of {{}}"),
+        (weak, "the reference posture cannot be held: its torque is above the limit of {}"),
+        (slow, "some posture leaves almost no torque to brake {}: their limits act early"),
+    ]
+    return [words.format(named(found)) for found, words in checks if found]
+
+
+def _room(joint: JointReport) -> float:
+    """Distance of the reference posture from the nearer limit."""
+    below = math.inf if joint.lower is None else joint.reference - joint.lower
+    above = math.inf if joint.upper is None else joint.upper - joint.reference
+    return min(below, above)

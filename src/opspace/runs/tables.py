@@ -1,0 +1,87 @@
+"""Tables for a person."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from opspace.record import Recording
+from opspace.runs.check import JointReport
+from opspace.runs.metrics import UNITS, Metrics, largest_torque_step
+from opspace.scenario.events import Event, in_order
+
+
+def metrics_table(runs: Mapping[str, Metrics]) -> tuple[list[str], list[list[str]]]:
+    """Write metrics, one column per run.
+
+    Args:
+        runs: Metrics by name of the run.
+
+    Returns:
+        Heads and rows; numbers that no run has are left out.
+    """
+    numbers = {name: metrics.to_json() for name, metrics in runs.items()}
+    rows = []
+    for key, unit in UNITS.items():
+        values = [found[key] for found in numbers.values()]
+        if any(value is not None for value in values):
+            rows.append(
+                [key.replace("_", " "), *map(_written, values), "" if unit == "1" else unit]
+            )
+    return ["", *numbers, "unit"], rows
+
+
+def timeline_table(
+    events: Sequence[Event], recording: Recording
+) -> tuple[list[str], list[list[str]]]:
+    """Write what happened to the stack and what it did to the torque, in order of time.
+
+    Args:
+        events: The events of the scenario.
+        recording: The run.
+
+    Returns:
+        Heads with units, and rows; the torque step is the largest of any joint between two ticks
+        from the beginning of the event to its end.
+    """
+    heads = ["from [s]", "to [s]", "event", "level", "largest torque step [N·m]"]
+    rows = []
+    for _, event in in_order(events):
+        what = f"{event.kind} {', '.join(event.tasks)}"
+        level = "-" if event.level is None else f"{event.level:g}"
+        step = largest_torque_step(recording, event.at, event.end)
+        rows.append([f"{event.at:.3f}", f"{event.end:.3f}", what, level, _written(step)])
+    return heads, rows
+
+
+def joints_table(joints: Sequence[JointReport]) -> tuple[list[str], list[list[str]]]:
+    """Write what is known of joints, one row each.
+
+    Args:
+        joints: The joints.
+
+    Returns:
+        Heads with units, and rows.
+    """
+    heads = [
+        "joint",
+        "reference [rad]",
+        "lower [rad]",
+        "upper [rad]",
+        "speed [rad/s]",
+        "torque [N·m]",
+        "gravity [N·m]",
+        "brake [rad/s²]",
+    ]
+    rows = []
+    for j in joints:
+        numbers = (j.reference, j.lower, j.upper, j.max_velocity, j.max_torque, j.gravity, j.brake)
+        rows.append([j.name, *map(_written, numbers)])
+    return heads, rows
+
+
+def _written(value: bool | float | None) -> str:
+    if value is None:
+        return "-"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return f"{value:.3g}"

@@ -1,0 +1,135 @@
+"""The simulated robot: MuJoCo, driven by joint torque."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from opspace.errors import InputError, ModelError, missing_extra
+from opspace.sim.disturbances import NO_DISTURBANCES, Disturbances, Hand, Wire
+
+if TYPE_CHECKING:
+    from opspace.robots.protocol import Robot
+
+
+def _import_mujoco() -> Any:
+    try:
+        import mujoco  # noqa: PLC0415 - an extra, and slow to import
+    except ImportError:
+        raise missing_extra("mujoco", "sim") from None
+    return mujoco
+
+
+class MujocoPlant:
+    """A robot in MuJoCo with nothing between the command and its joints but what is asked for.
+
+    Args:
+        robot: The robot whose file is simulated.
+        q: Configuration at the start, (nq,).
+        v: Velocity at the start, (n,), rad/s; zero where not given.
+        dt: Time step, s.
+        friction: Simulate the joint friction that the model has; the controller does not know it.
+        torque_limits: Saturate the torque at the robot's limits.
+        disturbances: What the controller's model does not know.
+
+    Raises:
+        MissingExtraError: MuJoCo is not installed.
+        ModelError: The robot has no file, or MuJoCo cannot simulate it.
+        InputError: The start state or a disturbance does not fit the robot.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        q: np.ndarray,
+        v: np.ndarray | None = None,
+        *,
+        dt: float = 0.001,
+        friction: bool = False,
+        torque_limits: bool = True,
+        disturbances: Disturbances = NO_DISTURBANCES,
+    ) -> None:
+        if not (math.isfinite(dt) and dt > 0.0):
+            raise InputError(f"the time step must be above 0 s, got {dt}")
+        mujoco = _import_mujoco()
+        from opspace.robots.mujoco_model import mujoco_model  # noqa: PLC0415 - imports mujoco
+
+        if robot.source is None:
+            raise ModelError(f"robot {robot.name!r} has no file that a simulator could load")
+        self._mujoco = mujoco
+        self.model = mujoco_model(robot.source, robot.floating_base, robot.locked_joints)
+        self.model.opt.timestep = dt
+        # Implicit in the velocity: stable for stiff friction, exact for a frictionless arm to O(dt).
+        self.model.opt.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+        # Joint ranges are the controller's job, and a stop or a contact would hide its failures.
+        self.model.opt.disableflags |= (
+            mujoco.mjtDisableBit.mjDSBL_CONTACT
+            | mujoco.mjtDisableBit.mjDSBL_LIMIT
+            | mujoco.mjtDisableBit.mjDSBL_ACTUATION
+            # A run that diverges must be seen to diverge, not start again from the beginning.
+            | mujoco.mjtDisableBit.mjDSBL_AUTORESET
+        )
+        if not friction:
+            self.model.dof_damping[:] = 0.0
+            self.model.dof_frictionloss[:] = 0.0
+        disturbances.spoil(self.model, robot.torque_limit)
+        self._limit = robot.torque_limit if torque_limits else np.full(robot.nv, np.inf)
+        self._robot = robot
+        self._wire = Wire(round(disturbances.delay / dt))
+        self._hand = Hand(robot, disturbances.pushes)
+        self._sensors = disturbances.sensors()
+        self.data = mujoco.MjData(self.model)
+        if disturbances.mass_error:
+            mujoco.mj_setConst(self.model, self.data)
+        start = np.asarray(q, dtype=float)
+        if start.shape != (self.model.nq,) or not np.all(np.isfinite(start)):
+            raise InputError(
+                f"the start configuration of {robot.name!r} must be {self.model.nq} finite numbers"
+            )
+        self.data.qpos[:] = start
+        if v is not None:
+            speed = np.asarray(v, dtype=float)
+            if speed.shape != (self.model.nv,) or not np.all(np.isfinite(speed)):
+                raise InputError(
+                    f"the start velocity of {robot.name!r} must be {self.model.nv} finite numbers"
+                )
+            self.data.qvel[:] = speed
+        mujoco.mj_forward(self.model, self.data)
+        self.dt = dt
+
+    @property
+    def t(self) -> float:
+        """Simulated time, s."""
+        return float(self.data.time)
+
+    @property
+    def q(self) -> np.ndarray:
+        """Configuration, (nq,), a copy."""
+        return np.array(self.data.qpos)
+
+    @property
+    def v(self) -> np.ndarray:
+        """Velocity, (n,), rad/s, a copy."""
+        return np.array(self.data.qvel)
+
+    @property
+    def noisy(self) -> bool:
+        """Whether what is measured differs from the state."""
+        return self._sensors.noisy
+
+    def measure(self) -> tuple[np.ndarray, np.ndarray]:
+        """Read the sensors: configuration (nq,) and velocity (n,), with their noise."""
+        return self._sensors.read(self._robot, self.q, self.v)
+
+    def advance(self, tau: np.ndarray) -> None:
+        """Hold a joint torque for one time step.
+
+        Args:
+            tau: (n,) N·m.
+        """
+        applied = np.clip(self._wire.send(tau), -self._limit, self._limit)
+        push = self._hand.torque(self.t, self.data.qpos, self.data.qvel)
+        self.data.qfrc_applied[:] = applied if push is None else applied + push
+        self._mujoco.mj_step(self.model, self.data)

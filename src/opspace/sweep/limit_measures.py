@@ -1,0 +1,104 @@
+"""What a run of a sweep did to its limits, whoever asked for what."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from opspace.command import Command, Status
+from opspace.scenario.build import Built
+from opspace.tasks.joint_limits import Side
+
+UNITS = {
+    "max_torque_step": "N·m",
+    "max_torque_use": "1",
+    "max_joint_speed": "rad/s",
+    "position_excess": "rad",
+    "position_outside": "rad",
+    "speed_excess": "rad/s",
+    "not_finite": "ticks",
+    "above_torque_limit": "ticks",
+    "max_hard_solves": "1",
+}
+"""The unit of each number of a row."""
+
+_ROUNDING = 1e-9
+
+
+class Watch:
+    """The observer of a run that keeps numbers instead of columns.
+
+    ``position_excess`` is how far any joint went beyond a limit that could be respected: one that it
+    had once been able to stop at, v <= v_adm(d) (`opspace.JointLimits`), and since then neither a
+    push has driven it nor has a tick said ``LIMIT_LOST``. ``speed_excess`` likewise, for joints that
+    were slow enough once. ``position_outside`` asks for no reason: it is how far any joint went beyond a
+    limit that it had once been inside of.
+
+    Args:
+        built: The run.
+    """
+
+    def __init__(self, built: Built) -> None:
+        limits = built.stack.limits
+        self._limits = limits
+        self._sides: tuple[Side, ...] = () if limits is None else limits.sides
+        self._sign = np.array([side.sign for side in self._sides])
+        self._index = np.array([side.index for side in self._sides], dtype=int)
+        self._limit = np.array([side.limit for side in self._sides])
+        self._speed = np.array([side.speed for side in self._sides])
+        self._stops = np.zeros(len(self._sides), dtype=bool)
+        self._slow = np.zeros(len(self._sides), dtype=bool)
+        self._inside = np.zeros(len(self._sides), dtype=bool)
+        self._plant = built.plant
+        self._pushes = built.scenario.plant.pushes
+        self._torque_limit = built.robot.torque_limit
+        self._dt = built.scenario.dt
+        self._last: np.ndarray | None = None
+        self._ticks = dict.fromkeys((status for status in Status if status), 0)
+        self.numbers: dict[str, float] = dict.fromkeys(UNITS, 0.0)
+
+    def observe(self, q: np.ndarray, v: np.ndarray, command: Command) -> None:
+        """See one tick; the plant's state counts, not the measured one."""
+        del q, v
+        tau, numbers = command.tau, self.numbers
+        v = self._plant.v
+        if self._last is not None:
+            self._most("max_torque_step", float(np.max(np.abs(tau - self._last))))
+        self._last = tau
+        self._most("max_torque_use", float(np.max(np.abs(tau) / self._torque_limit)))
+        self._most("max_joint_speed", float(np.max(np.abs(v))))
+        self._most("max_hard_solves", float(command.hard_solves))
+        numbers["not_finite"] += not np.all(np.isfinite(tau))
+        numbers["above_torque_limit"] += bool(np.any(np.abs(tau) > self._torque_limit))
+        for status in self._ticks:
+            self._ticks[status] += status in command.status
+        self._watch_limits(command, self._plant.q, v)
+
+    @property
+    def seconds(self) -> dict[str, float]:
+        """How long each status held that was seen, s."""
+        return {str(s.name): n * self._dt for s, n in self._ticks.items() if n}
+
+    def _most(self, name: str, value: float) -> None:
+        self.numbers[name] = max(self.numbers[name], value)
+
+    def _watch_limits(self, command: Command, q: np.ndarray, v: np.ndarray) -> None:
+        limits, t = self._limits, command.t
+        if limits is None:
+            return
+        distance = self._sign * (self._limit - q[self._index])
+        towards = self._sign * v[self._index]
+        beyond = np.maximum(-distance - limits.clearance - _ROUNDING, 0.0)
+        self._inside |= beyond == 0.0
+        self._most("position_outside", float(np.max(beyond, where=self._inside, initial=0.0)))
+        pushed = any(p.at <= t <= p.at + p.duration + self._dt for p in self._pushes)
+        if pushed or Status.LIMIT_LOST in command.status:
+            self._stops[:] = self._slow[:] = False
+            return
+        for i in np.flatnonzero(~self._stops & (distance >= 0.0)):
+            allowed = limits.allowed_speed(self._sides[i], float(distance[i]))
+            self._stops[i] = towards[i] <= allowed
+        self._slow |= towards <= self._speed
+        self._most("position_excess", float(np.max(beyond, where=self._stops, initial=0.0)))
+        over = towards - self._speed
+        fast = self._slow & (over > _ROUNDING * self._speed)
+        self._most("speed_excess", float(np.max(over, where=fast, initial=0.0)))
