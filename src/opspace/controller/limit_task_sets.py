@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from opspace.law import Buffer, Profile, TaskSet
+from opspace.law.scalars import rises
 from opspace.tasks import JointLimits
 
 TOP = -1
@@ -115,9 +116,10 @@ def insertions(
             before = known.get(term.name, Insertion(0.0, -np.inf))
             a_other = float(term.sign * acceleration[term.index])
             h = shape((a_other - (term.command - term.margin)) / term.margin).value
-            insertion = Insertion(
-                max(h, before.activation), max(min(a_other, term.command), before.desired)
-            )
+            desired = max(min(a_other, term.command), before.desired)
+            insertion = Insertion(max(h, before.activation), desired)
+            if not (rises(h, before.activation) or rises(desired, before.desired)):
+                insertion = before
         if insertion.activation > 0.0:
             found[term.name] = insertion
     return found

@@ -32,6 +32,7 @@ from opspace.law import (
     combined,
     corners,
 )
+from opspace.law.scalars import LIMIT_PASSES
 from opspace.plan.scales import DEFAULT_SINGULARITY, Scales, Singularity
 from opspace.robots.protocol import Robot
 from opspace.stack import Blending, Member, Mixture, Stack, mixture
@@ -46,10 +47,6 @@ compensated only inside the range of the tasks and fades with them."""
 TORQUE_LIMITS = ("report", "priority")
 """``report``: a torque above the motors' limits is reported and left as it is. ``priority``: levels give
 way until it is inside, the lowest first."""
-
-LIMIT_PASSES = 4
-"""How often joint limits are inserted with the accelerations just found; each pass can find the
-joints that the ones before pushed against their own limits."""
 
 
 class ReferenceController:

@@ -19,6 +19,7 @@ from opspace.kernels.columns import (
 from opspace.kernels.inertia import acceleration_of, whiten
 from opspace.kernels.profiles import profile
 from opspace.kernels.projection import nearest_acceleration
+from opspace.kernels.scalars import rises
 from opspace.law.nearest import BROKEN, LOST
 from opspace.machine.jit import jit
 
@@ -86,7 +87,7 @@ def insert_limits(k):
             wanted = max(min(other, command), k.limit_wanted[i])
         if h <= 0.0:
             continue
-        if h != k.limit_h[i] or wanted != k.limit_wanted[i]:
+        if rises(h, k.limit_h[i]) or rises(wanted, k.limit_wanted[i]):
             changed = True
             k.limit_h[i], k.limit_wanted[i] = h, wanted
     return changed

@@ -43,9 +43,9 @@ from opspace.kernels.limit_rows import SIGN, begin_limits, insert_limits, keep_b
 from opspace.kernels.profiles import ramp
 from opspace.kernels.task_rows import evaluate_tasks
 from opspace.kernels.walk import begin, keep_inside, pass_on, slot_bit, walk
+from opspace.law.scalars import LIMIT_PASSES
 from opspace.machine.jit import jit
 
-LIMIT_PASSES = 4
 NO_GROUP, EXACT, CHAINED = range(3)
 FADED = int(Status.DIRECTION_OFF)
 LIMITED = int(Status.JOINT_LIMIT)

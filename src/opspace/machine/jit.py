@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numba
+from numba import types
 from numba.core.caching import IndexDataCacheFile
 from numba.core.options import DefaultOptions
 
@@ -80,6 +81,9 @@ def jit(function: Callable[..., Any], *, counted: bool = False, nogil: bool = Fa
     compiled: Any = numba.njit(
         cache=True, nogil=nogil, error_model="numpy", fastmath=FAST, **options
     )(function)
+    # A literal among the arguments would compile everything below once more.
+    template = compiled.get_call_template
+    compiled.get_call_template = lambda args, kws: template(*_unliteral(args, kws))
     cache = compiled._cache
     cache._cache_file = IndexDataCacheFile(
         cache_path=cache._cache_path,
@@ -89,9 +93,13 @@ def jit(function: Callable[..., Any], *, counted: bool = False, nogil: bool = Fa
     return compiled
 
 
+def _unliteral(args: Any, kws: dict[str, Any]) -> tuple[Any, dict[str, Any]]:
+    return tuple(map(types.unliteral, args)), {k: types.unliteral(kind) for k, kind in kws.items()}
+
+
 def is_kept(compiled: Any, arguments: tuple[Any, ...]) -> bool:
     """Whether the disk holds a function, compiled for arguments of these types on this processor."""
     cache = compiled._cache
-    types = tuple(numba.typeof(argument) for argument in arguments)
-    key = cache._index_key(types, compiled.targetctx.codegen())
+    signature = tuple(numba.typeof(argument) for argument in arguments)
+    key = cache._index_key(signature, compiled.targetctx.codegen())
     return key in cache._cache_file._load_index()
