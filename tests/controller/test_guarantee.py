@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 import opspace as osc
 from opspace import Status
-from opspace.law.nearest import LOST
+from opspace.law.scalars import LOST
 from opspace.sim import MujocoPlant
 
 ARMS = tuple(r.name for r in osc.available_robots() if r.kind == "arm" and r.installed)

@@ -6,8 +6,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from opspace.command import Status
-from opspace.controller import Controller
+from opspace.controller import Controller, ReferenceController
 from opspace.errors import InputError, UnknownNameError
+from opspace.law.scalars import allowed_speed
 from opspace.loop import simulate
 from opspace.robots import load_robot
 from opspace.sim import MujocoPlant
@@ -33,7 +34,7 @@ def test_a_joint_that_obeys_never_passes_its_limit(seed, brake, room, fraction, 
     rng = np.random.default_rng(seed)
     side = Side("joint", 0, sign, 0.7, brake)
     limits = JointLimits()
-    allowed, _ = limits._allowed_speed(room, brake)
+    allowed, _ = allowed_speed(room, brake, limits.k1)
     q, v = 0.7 - sign * room, sign * fraction * allowed
     wish = 0.0
     hardest = 0.0
@@ -57,17 +58,17 @@ def test_the_admissible_speed_is_once_differentiable_in_the_distance(distance, b
     knee = brake / limits.k1**2
     for x in (distance, 0.0, knee):
         (below, s0), (_, slope), (above, s1) = (
-            limits._allowed_speed(x + k * d, brake) for k in (-1, 0, 1)
+            allowed_speed(x + k * d, brake, limits.k1) for k in (-1, 0, 1)
         )
         assert (above - below) / (2 * d) == pytest.approx(slope, abs=1e-3)
         assert abs(s1 - s0) < 1e-2
-    assert limits._allowed_speed(0.0, brake)[0] == 0.0
+    assert allowed_speed(0.0, brake, limits.k1)[0] == 0.0
 
 
 @settings(max_examples=300)
 @given(st.floats(-2.0, -1e-3))
 def test_outside_the_limit_only_the_way_back_is_admissible(distance):
-    allowed, _ = JointLimits()._allowed_speed(distance, 20.0)
+    allowed, _ = allowed_speed(distance, 20.0, JointLimits.k1)
     assert -0.5 <= allowed < 0.0
 
 
@@ -133,11 +134,15 @@ def test_torque_is_continuous_where_limits_come_and_go(robot, mode):
 
 @pytest.mark.parametrize("sign", [-1, 1])
 def test_both_sides_are_mirror_images(sign):
-    limits = JointLimits()
     upper = Side("j", 0, 1.0, 0.75, 20.0)
     lower = Side("j", 0, -1.0, -0.75, 20.0)
-    assert limits.admissible(upper, 0.6 * sign, 0.3) == limits.admissible(lower, -0.6 * sign, -0.3)
-    assert limits.pull_back(upper, 0.6, 0.3) == limits.pull_back(lower, -0.6, -0.3)
+    for limits in (JointLimits(), JointLimits(mode="buffer")):
+        q, v = 0.6 * sign, 0.3
+        command = limits.admissible(upper, q, v)
+        assert command == limits.admissible(lower, -q, -v)
+        assert limits.presence(upper, q, v, 1.0, command) == limits.presence(
+            lower, -q, -v, 1.0, command
+        )
 
 
 def test_pushed_together_every_joint_keeps_its_limit(robot):
@@ -212,3 +217,51 @@ def test_a_joint_that_starts_outside_comes_back_and_stays(robot):
 def test_a_misspelt_profile_is_found_before_the_first_tick(robot):
     with pytest.raises(UnknownNameError, match=r"profile 'quintc'.*quintic"):
         Controller(robot, Stack([JointLimits(profile="quintc"), PostureTask()]))
+
+
+class Gentle(JointLimits):
+    """Never more than 1 rad/s² towards a limit."""
+
+    def admissible(self, side, position, speed):
+        return min(super().admissible(side, position, speed), 1.0)
+
+
+class Early(JointLimits):
+    """Takes part with all it has, always."""
+
+    def presence(self, side, position, speed, other, command):
+        return 1.0, min(other, command)
+
+
+class Wide(JointLimits):
+    def margin(self, side):
+        return 5.0 * side.brake
+
+
+@pytest.mark.parametrize("kind", [Gentle, Early, Wide])
+@pytest.mark.parametrize("form", [Controller, ReferenceController])
+def test_a_law_of_ones_own_is_honoured_in_both_forms(robot, kind, form):
+    """A subclass gives what the readable form with its law gives, and not what the built-in does."""
+    rng = np.random.default_rng(3)
+    q = robot.q_reference + rng.uniform(-0.2, 0.2, 6)
+    v = rng.uniform(-0.5, 0.5, 6)
+    target = robot.fresh()
+    target.update(q, v)
+    wanted = target.position(target.frame_id("tool")) + [0.3, 0.1, -0.2]
+
+    def torque(limits, form):
+        position = PositionTask(kp=400.0, target=wanted)
+        stack = Stack([limits, OrientationTask(), position, PostureTask()])
+        controller = form(load_robot("puma560"), stack)
+        return [controller.step(0.001 * i, q, v * np.cos(i)).tau for i in range(3)]
+
+    found = torque(kind(), form)
+    np.testing.assert_allclose(found, torque(kind(), ReferenceController), rtol=0, atol=1e-9)
+    if kind is Gentle:
+        assert np.max(np.abs(np.subtract(found, torque(JointLimits(), form)))) > 1.0
+
+
+def test_a_batch_refuses_a_law_of_ones_own_by_name(robot):
+    controller = Controller(robot, Stack([Gentle(), PostureTask(np.zeros(6))]))
+    with pytest.raises(InputError, match="Gentle"):
+        controller.torque_batch(np.zeros((2, 6)), np.zeros((2, 6)))

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from opspace.kernels.algebra import cholesky, singular_values
 from opspace.kernels.corners import sort_corners
 from opspace.kernels.inertia import inertia_handle, make_inertia
-from opspace.kernels.profiles import PROFILE_CODE, profile, ramp
+from opspace.kernels.scalars import profile, ramp
 from opspace.kernels.walk import begin, pass_on, slot_bit, walk
 from opspace.law import SigmaBuffer, TaskSet, blended_torque, corners
 from opspace.law.activation import PROFILES, Profile, Ramp
@@ -78,7 +78,7 @@ def test_the_compiled_law_is_the_law(seed, smooth, blending):
     L = np.linalg.cholesky(M)
     blend = corners([task.activation for task in tasks], blending)
     option = SigmaBuffer(0.2, 1.0) if smooth else None
-    buffer = np.array([float(smooth), 0.2, 1.0, PROFILE_CODE["quintic"]])
+    buffer = np.array([float(smooth), 0.2, 1.0, PROFILES.index("quintic")])
     expected, _ = blended_torque(L, tasks, blend, option)
     tau = compiled_torque(L, tasks, blend, buffer)
     scale = max(1.0, float(np.max(np.abs(expected))))
@@ -87,7 +87,7 @@ def test_the_compiled_law_is_the_law(seed, smooth, blending):
 
 @given(st.sampled_from(PROFILES), st.floats(-0.5, 1.5))
 def test_profiles(name, s):
-    assert profile(PROFILE_CODE[name], s) == pytest.approx(Profile(name)(s).value, abs=1e-15)
+    assert profile(PROFILES.index(name), s) == pytest.approx(Profile(name)(s).value, abs=1e-15)
 
 
 @given(
@@ -100,11 +100,7 @@ def test_ramps(name, turns, t):
     for target, duration, wait in turns:
         readable = readable.towards(target, duration, now)
         now += wait
-    value = ramp(
-        t, PROFILE_CODE[name], readable.target, readable.start_time, readable.duration,
-        readable.phase, readable.rate, readable.acceleration, readable.blend_time,
-        readable.cruise,
-    )  # fmt: skip
+    value = ramp(t, PROFILES.index(name), *readable.numbers)
     assert value == pytest.approx(readable(t).value, abs=1e-12)
 
 
@@ -141,6 +137,6 @@ def test_just_above_a_small_buffer_the_last_level_keeps_its_digits(seed, decades
     tasks = [TaskSet(J, rng.normal(size=n + more), 0, 1.0, "a", 1.0)]
     blend = corners([1.0], "idv")
     expected, _ = blended_torque(np.eye(n), tasks, blend, SigmaBuffer(upper / 5.0, upper))
-    buffer = np.array([1.0, upper / 5.0, upper, PROFILE_CODE["quintic"]])
+    buffer = np.array([1.0, upper / 5.0, upper, PROFILES.index("quintic")])
     found = compiled_torque(np.eye(n), tasks, blend, buffer)
     np.testing.assert_allclose(found, expected, rtol=0, atol=1e-9 * np.linalg.norm(expected))

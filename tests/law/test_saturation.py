@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from opspace.law import Motors, TaskSet, blended_torque, corners
-from opspace.law.saturation import SHARE, room_for
+from opspace.law.scalars import SHARE, room_for
 
 SEEDS = st.integers(0, 2**32 - 1)
 

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-import opspace.controller
+import opspace.plan.scales
 import opspace.sim
 import opspace.tasks
 from opspace.errors import ScenarioError
@@ -44,7 +44,7 @@ def entry_defaults(entry):
 @pytest.mark.parametrize(
     ("entry", "built"),
     [
-        (schema.Singularity, opspace.controller.Singularity),
+        (schema.Singularity, opspace.plan.scales.Singularity),
         (schema.JointLimits, opspace.tasks.JointLimits),
         (schema.Plant, (opspace.sim.MujocoPlant, opspace.sim.Disturbances)),
         (schema.Stop, opspace.loop.StopRule),

@@ -9,9 +9,10 @@ from hypothesis import strategies as st
 
 from opspace.errors import InputError, MissingExtraError
 from opspace.robots import load_robot
+from opspace.runs import experiments
 from opspace.runs.geometry import first_axis, reach
 from opspace.runs.run import first_return
-from opspace.scenario import experiments, to_dict
+from opspace.scenario import to_dict
 from opspace.scenario.build import build
 
 ARMS = ("puma560", "ur5", "panda")

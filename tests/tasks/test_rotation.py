@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from opspace.errors import InputError
+from opspace.law.scalars import BRANCH_HOLD
 from opspace.tasks.rotation import (
     as_rotation,
     cross,
@@ -21,7 +22,7 @@ from opspace.tasks.rotation import (
     rotation_vector,
     skew,
 )
-from opspace.tasks.rotation_error import BRANCH_HOLD, RotationError
+from opspace.tasks.rotation_error import RotationError
 
 unit = st.floats(-1.0, 1.0)
 axes = (

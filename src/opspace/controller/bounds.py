@@ -35,10 +35,10 @@ def keep_bounds(
     """
     lower, upper = np.full(tau.size, -np.inf), np.full(tau.size, np.inf)
     for term in terms:
-        if term.sign > 0.0:
-            upper[term.index] = term.command
+        if term.side.sign > 0.0:
+            upper[term.side.index] = term.command
         else:
-            lower[term.index] = -term.command
+            lower[term.side.index] = -term.command
     acceleration = np.linalg.solve(M, tau - bias)
     if not excess(acceleration, lower, upper) > BROKEN:
         return tau, Status.OK

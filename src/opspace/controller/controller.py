@@ -29,7 +29,7 @@ from opspace.kernels.columns import (
     STATE_NOT_FINITE,
     TASK_BIAS,
 )
-from opspace.kernels.profiles import PROFILE_CODE
+from opspace.law import PROFILES
 from opspace.machine.record import Handle
 from opspace.plan.plan import Plan
 from opspace.plan.read_report import CompiledReport
@@ -215,7 +215,9 @@ class Controller(ReferenceController):
 
     def _compiled_robot(self) -> MotionAxes | None:
         """Give the robot's arrays: computed by compiled code where it can, else by its library."""
-        robot = self.robot
+        robot, limits = self.robot, self.stack.limits
+        if limits is not None and limits.overridden:
+            return None
         axes = robot.motion_axes() if isinstance(robot, AdapterBase) else None
         if axes is None or not isinstance(robot, AdapterBase):
             return None
@@ -225,7 +227,12 @@ class Controller(ReferenceController):
         return model.motion_axes(make_dynamics(model.bodies), *robot.state)
 
     def _batched(self, members: tuple[Member, ...], threads: int) -> Batch:
-        robot = self.robot
+        robot, limits = self.robot, self.stack.limits
+        if limits is not None and limits.overridden:
+            raise InputError(
+                f"joint limits of class {type(limits).__name__} have a law of their own, which a "
+                "batch cannot call; step() can"
+            )
         if self._bodies is None and isinstance(robot, AdapterBase):
             self._bodies = robot.rigid_model()
         if self._bodies is None or not isinstance(robot, AdapterBase):
@@ -263,7 +270,7 @@ class Controller(ReferenceController):
         if singularity is not None:
             option[SINGULAR] = 1.0
             option[SIGMA_LOWER], option[SIGMA_UPPER] = singularity.lower, singularity.upper
-            option[SIGMA_PROFILE] = PROFILE_CODE[singularity.profile]
+            option[SIGMA_PROFILE] = PROFILES.index(singularity.profile)
         option[DAMPING] = self.damping
         option[TASK_BIAS] = float(self.bias == "task")
         option[ROOM] = self._blending.room

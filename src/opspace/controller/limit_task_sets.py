@@ -7,9 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from opspace.law import Buffer, Profile, TaskSet
+from opspace.law import TaskSet
 from opspace.law.scalars import rises
 from opspace.tasks import JointLimits
+from opspace.tasks.joint_limits import Side
 
 TOP = -1
 """Priority of joint limits: above every level of the stack."""
@@ -20,20 +21,16 @@ class LimitTerms:
     """One limit in one tick, with accelerations counted towards the limit.
 
     Attributes:
-        name: "joint/side".
-        index: Velocity coordinate.
-        sign: +1 for an upper limit, −1 for a lower one.
+        side: The limit.
+        position: Of the joint, rad.
+        speed: Of the joint, rad/s.
         command: Acceleration that the task set asks for, rad/s².
-        activation: Activation by position (mode ``buffer``); 0 in mode ``admissible``.
-        margin: Width of the activation's rise on a_other, rad/s²; 0 in mode ``buffer``.
     """
 
-    name: str
-    index: int
-    sign: float
+    side: Side
+    position: float
+    speed: float
     command: float
-    activation: float
-    margin: float
 
 
 def limit_terms(
@@ -48,8 +45,7 @@ def limit_terms(
         limits: The limits, bound to the robot.
         positions: (n,) joint positions, rad.
         v: (n,) joint velocities, rad/s.
-        disturbance: (n,) accelerations that come on top of the commanded ones, rad/s²; None for
-            none. Mode ``buffer`` knows none.
+        disturbance: (n,) accelerations that come on top of the commanded ones, rad/s²; None for none.
 
     Returns:
         One entry per limit.
@@ -57,17 +53,10 @@ def limit_terms(
     terms: list[LimitTerms] = []
     for side in limits.sides:
         position, speed = float(positions[side.index]), float(v[side.index])
-        if limits.mode == "buffer":
-            command, inner, outer = limits.pull_back(side, position, speed)
-            distance = side.sign * (side.limit - position)
-            h = Buffer(inner, outer, limits.profile)(distance).value
-            terms.append(LimitTerms(side.name, side.index, side.sign, command, h, 0.0))
-        else:
-            command = limits.admissible(side, position, speed)
-            if disturbance is not None:
-                command -= side.sign * float(disturbance[side.index])
-            margin = limits.margin(side)
-            terms.append(LimitTerms(side.name, side.index, side.sign, command, 0.0, margin))
+        command = limits.admissible(side, position, speed)
+        if disturbance is not None:
+            command -= side.sign * float(disturbance[side.index])
+        terms.append(LimitTerms(side, position, speed, command))
     return terms
 
 
@@ -85,8 +74,8 @@ class Insertion:
 
 
 def insertions(
+    limits: JointLimits,
     terms: list[LimitTerms],
-    profile: str,
     acceleration: np.ndarray,
     known: Mapping[str, Insertion],
 ) -> dict[str, Insertion]:
@@ -99,29 +88,25 @@ def insertions(
     continuous in the accelerations, hence so is the result of any fixed number of repetitions.
 
     Args:
+        limits: Their law.
         terms: Every limit.
-        profile: Name of the activation profile.
         acceleration: (n,) joint accelerations under the stack with the insertions known so far.
         known: Insertions so far, by name.
 
     Returns:
         The insertions with an activation above 0, by name.
     """
-    shape = Profile(profile)
     found: dict[str, Insertion] = {}
     for term in terms:
-        if term.margin == 0.0:
-            insertion = Insertion(term.activation, term.command)
-        else:
-            before = known.get(term.name, Insertion(0.0, -np.inf))
-            a_other = float(term.sign * acceleration[term.index])
-            h = shape((a_other - (term.command - term.margin)) / term.margin).value
-            desired = max(min(a_other, term.command), before.desired)
-            insertion = Insertion(max(h, before.activation), desired)
-            if not (rises(h, before.activation) or rises(desired, before.desired)):
-                insertion = before
-        if insertion.activation > 0.0:
-            found[term.name] = insertion
+        side = term.side
+        before = known.get(side.name, Insertion(0.0, -np.inf))
+        other = float(side.sign * acceleration[side.index])
+        h, desired = limits.presence(side, term.position, term.speed, other, term.command)
+        h, desired = max(h, before.activation), max(desired, before.desired)
+        if not (rises(h, before.activation) or rises(desired, before.desired)):
+            h, desired = before.activation, before.desired
+        if h > 0.0:
+            found[side.name] = Insertion(h, desired)
     return found
 
 
@@ -132,13 +117,13 @@ def limit_task_sets(
     identity = np.eye(n)
     return [
         TaskSet(
-            identity[term.index : term.index + 1],
-            [term.sign * inserted[term.name].desired],
+            identity[term.side.index : term.side.index + 1],
+            [term.side.sign * inserted[term.side.name].desired],
             TOP,
-            inserted[term.name].activation,
-            term.name,
+            inserted[term.side.name].activation,
+            term.side.name,
             sigma_reference,
         )
         for term in terms
-        if term.name in inserted
+        if term.side.name in inserted
     ]

@@ -32,7 +32,7 @@ from opspace.law import (
     combined,
     corners,
 )
-from opspace.law.scalars import LIMIT_PASSES
+from opspace.law.scalars import LIMIT_PASSES, SCALED
 from opspace.plan.scales import DEFAULT_SINGULARITY, Scales, Singularity
 from opspace.robots.protocol import Robot
 from opspace.stack import Blending, Member, Mixture, Stack, mixture
@@ -227,7 +227,7 @@ class ReferenceController:
             return self._hold(t, timing | Status.FAULT)
         tau, status = self._checked(tau, limits)
         status |= timing | kept
-        if any(level.scale < 1.0 - 1e-12 for level in info.levels):
+        if any(level.scale < 1.0 - SCALED for level in info.levels):
             status |= Status.TORQUE_SCALED
         levels = level_status(members, mixed, info, len(limits))
         if any(np.any(level.activation < 1.0) for level in levels):
@@ -303,14 +303,14 @@ class ReferenceController:
         inserted: dict[str, Insertion] = {}
         for _ in range(LIMIT_PASSES):
             acceleration = self._acceleration(tau)
-            again = insertions(terms, limits.profile, acceleration, inserted)
+            again = insertions(limits, terms, acceleration, inserted)
             if again == inserted:
                 break
             inserted = again
             sets = limit_task_sets(terms, inserted, robot.nv, self._scales.joint)
             tau, info = self._law(L, sets, tasks, blend)
         kept = Status.OK
-        if limits.mode == "admissible":
+        if limits.law.bound:
             motors = robot.torque_limit if self.torque_limits == "priority" else None
             tau, kept = keep_bounds(terms, robot.M, robot.bias, tau, motors)
         if observer is not None:
@@ -395,7 +395,7 @@ class ReferenceController:
 
 
 def _observer(limits: JointLimits | None, n: int, torque_limits: str) -> DisturbanceObserver | None:
-    if limits is None or limits.observer_time is None or limits.mode != "admissible":
+    if limits is None or limits.observer_time is None or not limits.law.bound:
         return None
     if torque_limits != "priority":
         raise InputError(

@@ -12,8 +12,6 @@ OWN, MOTION, JOINTS = range(3)
 WORLD, RELATIVE, CENTRE_OF_MASS = range(3)
 # What is controlled of a motion.
 POSITION, ORIENTATION, POSE = range(3)
-# How joint limits work.
-ADMISSIBLE, BUFFER = range(2)
 
 # Columns of Tick.kind: a task as whole numbers.
 (
@@ -45,7 +43,7 @@ MAX_SPEED = 51
 TURN = 53
 NUMBERS_SIZE = 57
 
-# Columns of Tick.variable: an activation in time, as `opspace.kernels.profiles.ramp` takes it.
+# Columns of Tick.variable: an activation in time, as `opspace.law.scalars.ramp` takes it.
 PROFILE = 0
 RAMP = 1
 VARIABLE_SIZE = 9
@@ -59,13 +57,13 @@ VARIABLE_SIZE = 9
     DAMPING,
     TASK_BIAS,
     ROOM,
-    LIMIT_MODE,
+    LIMIT_LAW,
     LIMIT_PROFILE,
     LIMIT_WEIGHT,
     LIMIT_K1,
     LIMIT_K2,
     LIMIT_KP,
-    LIMIT_RETURN_SPEED,
+    LIMIT_BOUND,
     LIMIT_BUFFER,
     KEEP_TORQUE,
 ) = range(16)

@@ -15,8 +15,8 @@ from opspace.kernels.algebra import (
     solve_upper,
     solve_upper_transposed,
 )
-from opspace.kernels.profiles import profile
-from opspace.law.hierarchy import RANK_TOLERANCE
+from opspace.kernels.scalars import profile
+from opspace.law.scalars import RANK_TOLERANCE
 from opspace.machine.jit import jit
 
 REGULAR = 1e-6

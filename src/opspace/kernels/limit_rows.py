@@ -6,21 +6,19 @@ import math
 
 from opspace.command import Status
 from opspace.kernels.columns import (
-    BUFFER,
     KEEP_TORQUE,
+    LIMIT_BOUND,
     LIMIT_BUFFER,
     LIMIT_K1,
     LIMIT_K2,
     LIMIT_KP,
-    LIMIT_MODE,
+    LIMIT_LAW,
     LIMIT_PROFILE,
-    LIMIT_RETURN_SPEED,
 )
 from opspace.kernels.inertia import acceleration_of, whiten
-from opspace.kernels.profiles import profile
 from opspace.kernels.projection import nearest_acceleration
-from opspace.kernels.scalars import rises
-from opspace.law.nearest import BROKEN, LOST
+from opspace.kernels.scalars import limit_command, limit_presence, rises
+from opspace.law.scalars import BROKEN, LOST
 from opspace.machine.jit import jit
 
 FILTERED = int(Status.FILTERED)
@@ -32,37 +30,25 @@ SIGN, POSITION, BRAKE, MARGIN, COMMAND, SPEED, DISTURBANCE = range(7)
 
 @jit
 def begin_limits(k):
-    """Evaluate what every limit asks for; in mode ``buffer`` also how much it takes part."""
+    """Evaluate what every limit asks for; nothing is known yet about how much it takes part."""
+    option = k.option
     for i in range(k.limit.shape[0]):
         limit = k.limit[i]
         j = k.limit_joint[i]
-        distance = limit[SIGN] * (limit[POSITION] - k.q[j])
-        towards = limit[SIGN] * k.v[j]
         k.limit_h[i] = 0.0
         k.limit_wanted[i] = -math.inf
-        if k.option[LIMIT_MODE] == BUFFER:
-            kp, buffer = k.option[LIMIT_KP], k.option[LIMIT_BUFFER]
-            limit[COMMAND] = kp * (distance - buffer) - 2.0 * math.sqrt(kp) * towards
-        else:
-            allowed, slope = _allowed_speed(k.option, distance, limit[BRAKE])
-            k2 = k.option[LIMIT_K2]
-            stopping = -towards * slope + k2 * (allowed - towards)
-            limit[COMMAND] = min(stopping, k2 * (limit[SPEED] - towards)) - limit[DISTURBANCE]
-
-
-@jit
-def _allowed_speed(option, d, a):
-    """v_adm(d) and its slope, see `opspace.JointLimits`."""
-    k1 = option[LIMIT_K1]
-    if d < 0.0:
-        most = option[LIMIT_RETURN_SPEED]
-        x = k1 * d / most
-        return most * math.tanh(x), k1 / math.cosh(min(-x, 300.0)) ** 2
-    knee = a / (k1 * k1)
-    if d <= knee:
-        return k1 * d, k1
-    v = math.sqrt(2.0 * a * (d - 0.5 * knee))
-    return v, a / v
+        limit[COMMAND] = limit_command(
+            int(option[LIMIT_LAW]),
+            limit[SIGN] * (limit[POSITION] - k.q[j]),
+            limit[SIGN] * k.v[j],
+            limit[BRAKE],
+            limit[SPEED],
+            option[LIMIT_K1],
+            option[LIMIT_K2],
+            option[LIMIT_KP],
+            option[LIMIT_BUFFER],
+        )
+        limit[COMMAND] -= limit[DISTURBANCE]
 
 
 @jit
@@ -73,18 +59,22 @@ def insert_limits(k):
         Whether anything changed.
     """
     changed = False
-    shape = int(k.option[LIMIT_PROFILE])
+    option = k.option
     for i in range(k.limit.shape[0]):
         limit = k.limit[i]
         j = k.limit_joint[i]
-        if k.option[LIMIT_MODE] == BUFFER:
-            h, wanted = _by_position(k, limit, k.q[j], k.v[j], shape), limit[COMMAND]
-        else:
-            other = limit[SIGN] * k.joint_acceleration[j]
-            command, margin = limit[COMMAND], limit[MARGIN]
-            h = profile(shape, (other - (command - margin)) / margin)
-            h = max(h, k.limit_h[i])
-            wanted = max(min(other, command), k.limit_wanted[i])
+        h, wanted = limit_presence(
+            int(option[LIMIT_LAW]),
+            limit[SIGN] * (limit[POSITION] - k.q[j]),
+            limit[SIGN] * k.v[j],
+            limit[BRAKE],
+            option[LIMIT_BUFFER],
+            limit[SIGN] * k.joint_acceleration[j],
+            limit[COMMAND],
+            limit[MARGIN],
+            int(option[LIMIT_PROFILE]),
+        )
+        h, wanted = max(h, k.limit_h[i]), max(wanted, k.limit_wanted[i])
         if h <= 0.0:
             continue
         if rises(h, k.limit_h[i]) or rises(wanted, k.limit_wanted[i]):
@@ -94,21 +84,13 @@ def insert_limits(k):
 
 
 @jit
-def _by_position(k, limit, q, v, shape):
-    towards = max(limit[SIGN] * v, 0.0)
-    inner = k.option[LIMIT_BUFFER] + towards * towards / (2.0 * limit[BRAKE])
-    distance = limit[SIGN] * (limit[POSITION] - q)
-    return profile(shape, (distance - inner) / (0.0 - inner))
-
-
-@jit
 def keep_bounds(k):
     """Replace the torque by the nearest one with which no joint accelerates more than it may.
 
     Returns:
         What happened, in the numbers of `opspace.Status`.
     """
-    if k.option[LIMIT_MODE] == BUFFER:
+    if k.option[LIMIT_BOUND] == 0.0:
         return 0
     n = k.v.shape[0]
     x = k.joint_acceleration

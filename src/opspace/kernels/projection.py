@@ -9,7 +9,7 @@ import numpy as np
 
 from opspace.kernels.algebra import cholesky, solve_lower, solve_lower_transposed
 from opspace.kernels.inertia import acceleration_of, unit_row, whitened_of
-from opspace.law.nearest import HARD, SOFT, UNBOUNDED
+from opspace.law.scalars import HARD, SOFT, UNBOUNDED
 from opspace.machine.jit import jit
 from opspace.machine.record import Handle
 

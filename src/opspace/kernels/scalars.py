@@ -1,9 +1,30 @@
-"""Scalar laws of `opspace.law.scalars`, compiled."""
+"""The functions of `opspace.law.scalars`, compiled; they call one another in this form too."""
 
 from __future__ import annotations
+
+from types import FunctionType
+from typing import Any
 
 from opspace.law import scalars
 from opspace.machine.jit import jit
 
-rises = jit(scalars.rises)
-"""`opspace.law.scalars.rises`."""
+
+def _compiled() -> dict[str, Any]:
+    """Compile every function, with a namespace in which those before it are compiled already."""
+    names = dict(vars(scalars))
+    for name, function in vars(scalars).items():
+        if isinstance(function, FunctionType) and function.__module__ == scalars.__name__:
+            names[name] = jit(FunctionType(function.__code__, names, name))
+    return names
+
+
+_COMPILED = _compiled()
+
+profile = _COMPILED["profile"]
+ramp = _COMPILED["ramp"]
+limit_command = _COMPILED["limit_command"]
+limit_presence = _COMPILED["limit_presence"]
+rises = _COMPILED["rises"]
+goes_on = _COMPILED["goes_on"]
+speed_scale = _COMPILED["speed_scale"]
+room_for = _COMPILED["room_for"]

@@ -25,10 +25,8 @@ from opspace.kernels.columns import (
     TURN,
 )
 from opspace.kernels.motion import A, P, R, V, measure, move_joints
-from opspace.law.scalars import BRANCH_HOLD
+from opspace.kernels.scalars import goes_on, speed_scale
 from opspace.machine.jit import jit
-
-LONGEST_WAY = math.cos(0.5 * (math.pi + BRANCH_HOLD))
 
 
 @jit
@@ -133,8 +131,7 @@ def _within_speed(k, first, end, limit):
         if k.kp[row] > 0.0:
             asked = k.kp[row] / k.kv[row] * k.error[row]
             total += asked * asked
-    speed = math.sqrt(total)
-    return limit / speed if speed > limit else 1.0
+    return speed_scale(math.sqrt(total), limit)
 
 
 @jit
@@ -150,7 +147,7 @@ def _rotation_error(kind, number, x, e, at):
         agreement = (
             w * number[TURN] + a * number[TURN + 1] + b * number[TURN + 2] + c * number[TURN + 3]
         )
-        if agreement < 0.0 and -w >= LONGEST_WAY:
+        if goes_on(agreement, w):
             w, a, b, c = -w, -a, -b, -c
     kind[REMEMBERS] = 1
     number[TURN], number[TURN + 1], number[TURN + 2], number[TURN + 3] = w, a, b, c

@@ -40,10 +40,11 @@ from opspace.kernels.inertia import (
 )
 from opspace.kernels.level import project, solve_level, take_alternative
 from opspace.kernels.limit_rows import SIGN, begin_limits, insert_limits, keep_bounds
-from opspace.kernels.profiles import ramp
+from opspace.kernels.scalars import ramp
 from opspace.kernels.task_rows import evaluate_tasks
 from opspace.kernels.walk import begin, keep_inside, pass_on, slot_bit, walk
 from opspace.law.scalars import LIMIT_PASSES
+from opspace.law.scalars import SCALED as GIVEN_WAY
 from opspace.machine.jit import jit
 
 NO_GROUP, EXACT, CHAINED = range(3)
@@ -360,6 +361,6 @@ def status(k):
         k.scale[d] = 1.0
         if k.option[KEEP_TORQUE] != 0.0 and k.space.got[d, 1] > 0.0:
             k.scale[d] = min(k.space.got[d, 0] / k.space.got[d, 1], 1.0)
-            if k.scale[d] < 1.0 - 1e-12:
+            if k.scale[d] < 1.0 - GIVEN_WAY:
                 bits |= SCALED
     return bits

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from opspace.kernels.inertia import torque_of
 from opspace.kernels.level import project, solve_level, take_alternative
-from opspace.kernels.saturation import room_for
+from opspace.kernels.scalars import room_for
 from opspace.machine.jit import jit
 
 # Columns of ``Space.cursor``.

@@ -1,8 +1,9 @@
 """The mathematics of continuous task transitions: arrays in, arrays out, no robot."""
 
-from opspace.law.activation import PROFILES, Activation, Buffer, Profile, Ramp
+from opspace.law.activation import Activation, Buffer, Profile, Ramp
 from opspace.law.blending import BLENDINGS, Weighted, combined, corners
-from opspace.law.nearest import BROKEN, LOST, excess, nearest_acceleration
+from opspace.law.nearest import excess, nearest_acceleration
+from opspace.law.scalars import BROKEN, LOST, PROFILES
 from opspace.law.singular_directions import SigmaBuffer
 from opspace.law.tasksets import TaskSet
 from opspace.law.torque import COUPLINGS, LawInfo, blended_torque, intermediate_values, task_torque

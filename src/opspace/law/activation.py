@@ -4,12 +4,17 @@
 # pyright: strict, reportConstantRedefinition=false, reportUnknownMemberType=false
 # pyright: reportUnknownVariableType=false, reportUnknownArgumentType=false
 import math
-from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from types import MappingProxyType
 from typing import NamedTuple
 
 from opspace.errors import InputError, unknown_name
+from opspace.law.scalars import (
+    PROFILES,
+    profile,
+    profile_curvature,
+    profile_slope,
+    ramp_phase,
+)
 
 
 class Activation(NamedTuple):
@@ -21,69 +26,6 @@ class Activation(NamedTuple):
 
 
 _INSTANT = 1e-9
-_TANH_EDGE = 4e-3
-_OFF = Activation(0.0, 0.0, 0.0)
-_ON = Activation(1.0, 0.0, 0.0)
-
-
-def _linear(s: float) -> Activation:
-    return Activation(s, 1.0, 0.0)
-
-
-def _cubic(s: float) -> Activation:
-    return Activation(s * s * (3.0 - 2.0 * s), 6.0 * s * (1.0 - s), 6.0 - 12.0 * s)
-
-
-def _quintic(s: float) -> Activation:
-    return Activation(
-        s**3 * (10.0 + s * (6.0 * s - 15.0)),
-        30.0 * s * s * (1.0 - s) ** 2,
-        60.0 * s * (1.0 - s) * (1.0 - 2.0 * s),
-    )
-
-
-def _half_sine(s: float) -> Activation:
-    angle = math.pi * s
-    return Activation(
-        0.5 - 0.5 * math.cos(angle),
-        0.5 * math.pi * math.sin(angle),
-        0.5 * math.pi**2 * math.cos(angle),
-    )
-
-
-def _tanh(s: float) -> Activation:
-    # Nearer to an end the value equals 0 or 1 to the last bit and cosh overflows.
-    if not _TANH_EDGE < s < 1.0 - _TANH_EDGE:
-        return _ON if s > 0.5 else _OFF
-    argument = 1.0 / (1.0 - s) - 1.0 / s
-    slope = 1.0 / (1.0 - s) ** 2 + 1.0 / s**2
-    curvature = 2.0 / (1.0 - s) ** 3 - 2.0 / s**3
-    tangent = math.tanh(argument)
-    sech2 = 1.0 / math.cosh(argument) ** 2
-    return Activation(
-        0.5 * (1.0 + tangent),
-        0.5 * sech2 * slope,
-        0.5 * sech2 * (curvature - 2.0 * tangent * slope**2),
-    )
-
-
-def _step(s: float) -> Activation:
-    return _ON if s >= 0.5 else _OFF
-
-
-_SHAPES: Mapping[str, Callable[[float], Activation]] = MappingProxyType(
-    {
-        "linear": _linear,
-        "cubic": _cubic,
-        "quintic": _quintic,
-        "half-sine": _half_sine,
-        "tanh": _tanh,
-        "step": _step,
-    }
-)
-
-PROFILES = tuple(_SHAPES)
-"""Names of the profiles. ``step`` is the hard switch that all of this avoids, for comparisons."""
 
 
 @dataclass(frozen=True)
@@ -113,18 +55,13 @@ class Profile:
     name: str = "quintic"
 
     def __post_init__(self) -> None:
-        if self.name not in _SHAPES:
+        if self.name not in PROFILES:
             raise unknown_name("activation profile", self.name, PROFILES)
 
     def __call__(self, s: float) -> Activation:
         """Evaluate h, dh/ds and d²h/ds² at ``s`` (any real number)."""
-        if s <= 0.0:
-            return _OFF
-        if s >= 1.0:
-            return _ON
-        h = _SHAPES[self.name](s)
-        # Rounding of a polynomial next to its end must not leave [0, 1].
-        return Activation(min(max(h.value, 0.0), 1.0), h.slope, h.curvature)
+        code = PROFILES.index(self.name)
+        return Activation(profile(code, s), profile_slope(code, s), profile_curvature(code, s))
 
 
 @dataclass(frozen=True)
@@ -248,30 +185,15 @@ class Ramp:
         return t >= self.start_time + self.duration
 
     def _phase(self, t: float) -> tuple[float, float, float]:
-        tau = max(t - self.start_time, 0.0)
-        if tau >= self.duration:
-            return self.target, 0.0, 0.0
-        if tau >= self.blend_time:
-            covered = self.blend_time * (
-                (self.rate + self.cruise) / 2.0 + self.blend_time * self.acceleration / 12.0
-            )
-            return self.phase + covered + self.cruise * (tau - self.blend_time), self.cruise, 0.0
-        # The rate is a cubic Hermite segment from (rate, acceleration) to (cruise, 0).
-        width, x = self.blend_time, tau / self.blend_time
-        s = self.phase + width * (
-            self.rate * (x**4 / 2 - x**3 + x)
-            + self.acceleration * width * (x**4 / 4 - 2 * x**3 / 3 + x**2 / 2)
-            + self.cruise * (x**3 - x**4 / 2)
-        )
-        rate = (
-            self.rate * (2 * x**3 - 3 * x**2 + 1)
-            + self.acceleration * width * (x**3 - 2 * x**2 + x)
-            + self.cruise * (3 * x**2 - 2 * x**3)
-        )
-        acceleration = (self.cruise - self.rate) * (
-            6 * x - 6 * x**2
-        ) / width + self.acceleration * (3 * x**2 - 4 * x + 1)
-        return s, rate, acceleration
+        return ramp_phase(t, *self.numbers)
+
+    @property
+    def numbers(self) -> tuple[float, float, float, float, float, float, float, float]:
+        """Target, start, duration, phase, rate, acceleration, blend time and cruise rate."""
+        return (
+            self.target, self.start_time, self.duration, self.phase,
+            self.rate, self.acceleration, self.blend_time, self.cruise,
+        )  # fmt: skip
 
 
 def _check_target(value: float) -> None:

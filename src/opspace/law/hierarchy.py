@@ -16,11 +16,8 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float
 
+from opspace.law.scalars import RANK_TOLERANCE
 from opspace.law.tasksets import TaskSet
-
-RANK_TOLERANCE = 1e-8
-"""Singular values of a projected level below this fraction of the level's largest unprojected one
-are rounding noise of the projection: 16 digits, halved by ill-conditioned levels above."""
 
 
 @dataclass(frozen=True)

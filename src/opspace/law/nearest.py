@@ -5,17 +5,7 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Float
 
-SOFT = 1e-7
-"""How soft bounds on accelerations are; where they contradict each other or the motors, the excess is
-shared."""
-HARD = 1e-12
-"""How soft bounds on torques are: softer than rounding, harder than those on accelerations."""
-BROKEN = 1e-9
-"""A bound is broken by more than this part of itself, or by more than this."""
-LOST = 1e-3
-"""A bound that is still broken by more than this part of itself, or by more than this, is lost."""
-UNBOUNDED = 1e30
-"""Bounds beyond are none."""
+from opspace.law.scalars import HARD, SOFT, UNBOUNDED
 
 
 def nearest_acceleration(

@@ -1,12 +1,159 @@
-"""Scalar laws and numbers that the readable and the compiled form share; each stands here once."""
+"""Scalar laws and numbers that the readable and the compiled form share; each stands here once.
 
+Plain functions of floats: the readable form calls them as they are, and `opspace.kernels.scalars`
+compiles all of them. They may call one another and use numbers of this module, nothing else.
+"""
+
+# pyright: strict
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+from typing import NamedTuple
 
-# How far past half a turn the direction chosen before is kept, rad. Noise and overshoot near half
-# a turn are far smaller; at a full turn the direction would be lost, so it cannot be kept for ever.
-BRANCH_HOLD = 0.5 * math.pi
+import numpy as np
+
+# --- Activation profiles h(s) between s = 0 and s = 1, see `opspace.Profile` -------------------------
+
+PROFILES = ("linear", "cubic", "quintic", "half-sine", "tanh", "step")
+"""Names of the profiles; the place of a name is its code. ``step`` is the hard switch that all of this
+avoids, for comparisons."""
+LINEAR, CUBIC, QUINTIC, HALF_SINE, TANH, STEP = range(6)
+
+TANH_EDGE = 4e-3
+"""Nearer to an end the value of ``tanh`` equals 0 or 1 to the last bit, and cosh overflows."""
+
+
+def profile(code: int, s: float) -> float:
+    """Evaluate h(s), 0 below s = 0 and 1 above s = 1."""
+    if s <= 0.0:
+        return 0.0
+    if s >= 1.0:
+        return 1.0
+    if code == QUINTIC:
+        h = s**3 * (10.0 + s * (6.0 * s - 15.0))
+    elif code == CUBIC:
+        h = s * s * (3.0 - 2.0 * s)
+    elif code == HALF_SINE:
+        h = 0.5 - 0.5 * math.cos(math.pi * s)
+    elif code == TANH:
+        h = _tanh(s)
+    elif code == STEP:
+        h = 1.0 if s >= 0.5 else 0.0
+    else:
+        h = s
+    # Rounding of a polynomial next to its end must not leave [0, 1].
+    return min(max(h, 0.0), 1.0)
+
+
+def profile_slope(code: int, s: float) -> float:
+    """Evaluate dh/ds."""
+    if s <= 0.0 or s >= 1.0 or code == STEP:
+        return 0.0
+    if code == QUINTIC:
+        return 30.0 * s * s * (1.0 - s) ** 2
+    if code == CUBIC:
+        return 6.0 * s * (1.0 - s)
+    if code == HALF_SINE:
+        return 0.5 * math.pi * math.sin(math.pi * s)
+    if code == TANH:
+        return _tanh_derivatives(s)[0]
+    return 1.0
+
+
+def profile_curvature(code: int, s: float) -> float:
+    """Evaluate d²h/ds²."""
+    if s <= 0.0 or s >= 1.0 or code == STEP:
+        return 0.0
+    if code == QUINTIC:
+        return 60.0 * s * (1.0 - s) * (1.0 - 2.0 * s)
+    if code == CUBIC:
+        return 6.0 - 12.0 * s
+    if code == HALF_SINE:
+        return 0.5 * math.pi**2 * math.cos(math.pi * s)
+    if code == TANH:
+        return _tanh_derivatives(s)[1]
+    return 0.0
+
+
+def _tanh(s: float) -> float:
+    if not TANH_EDGE < s < 1.0 - TANH_EDGE:
+        return 1.0 if s > 0.5 else 0.0
+    return 0.5 * (1.0 + math.tanh(1.0 / (1.0 - s) - 1.0 / s))
+
+
+def _tanh_derivatives(s: float) -> tuple[float, float]:
+    if not TANH_EDGE < s < 1.0 - TANH_EDGE:
+        return 0.0, 0.0
+    argument = 1.0 / (1.0 - s) - 1.0 / s
+    slope = 1.0 / (1.0 - s) ** 2 + 1.0 / s**2
+    curvature = 2.0 / (1.0 - s) ** 3 - 2.0 / s**3
+    sech2 = 1.0 / math.cosh(argument) ** 2
+    return 0.5 * sech2 * slope, 0.5 * sech2 * (curvature - 2.0 * math.tanh(argument) * slope**2)
+
+
+# --- Activations in time, see `opspace.Ramp` ---------------------------------------------------------
+
+
+def ramp_phase(
+    t: float,
+    target: float,
+    start_time: float,
+    duration: float,
+    phase: float,
+    rate: float,
+    acceleration: float,
+    width: float,
+    cruise: float,
+) -> tuple[float, float, float]:
+    """Evaluate s(t) of a ramp and its first two derivatives.
+
+    The rate of s is led by a cubic Hermite segment of this width from (rate, acceleration) to
+    (cruise, 0), and stays there until the ramp arrives.
+    """
+    tau = max(t - start_time, 0.0)
+    if tau >= duration:
+        return target, 0.0, 0.0
+    if tau >= width:
+        covered = width * ((rate + cruise) / 2.0 + width * acceleration / 12.0)
+        return phase + covered + cruise * (tau - width), cruise, 0.0
+    x = tau / width
+    s = phase + width * (
+        rate * (x**4 / 2 - x**3 + x)
+        + acceleration * width * (x**4 / 4 - 2 * x**3 / 3 + x**2 / 2)
+        + cruise * (x**3 - x**4 / 2)
+    )
+    ds = (
+        rate * (2 * x**3 - 3 * x**2 + 1)
+        + acceleration * width * (x**3 - 2 * x**2 + x)
+        + cruise * (3 * x**2 - 2 * x**3)
+    )
+    dds = (cruise - rate) * (6 * x - 6 * x**2) / width + acceleration * (3 * x**2 - 4 * x + 1)
+    return s, ds, dds
+
+
+def ramp(
+    t: float,
+    code: int,
+    target: float,
+    start_time: float,
+    duration: float,
+    phase: float,
+    rate: float,
+    acceleration: float,
+    width: float,
+    cruise: float,
+) -> float:
+    """Evaluate h(t) of a ramp with the profile of this code."""
+    s, _, _ = ramp_phase(t, target, start_time, duration, phase, rate, acceleration, width, cruise)
+    return profile(code, s)
+
+
+# --- Joint limits, see `opspace.JointLimits`; everything is counted towards the limit -----------------
+
+RETURN_SPEED = 0.5
+"""Speed at which a joint that is outside its limits is brought back, rad/s or m/s."""
 
 LIMIT_PASSES = 4
 """How often joint limits are inserted with the accelerations just found; each pass can find the
@@ -16,6 +163,205 @@ LAST_BITS = 1e-9
 """What differs by less of itself, or by less than this, is the same."""
 
 
+ADMISSIBLE, BUFFER = range(2)
+
+
+class LimitLaw(NamedTuple):
+    """How a joint limit acts.
+
+    Attributes:
+        code: Its number in compiled code.
+        command: (d, towards, brake, most, k1, k2, kp, buffer) → acceleration towards the limit, rad/s².
+        presence: (d, towards, brake, buffer, other, command, margin, profile) → activation h of the
+            limit's task set and what it asks for, where the joint would do ``other`` without it.
+        bound: Whether the command is the most that the joint may do, which is kept whatever happens.
+    """
+
+    code: int
+    command: Callable[[float, float, float, float, float, float, float, float], float]
+    presence: Callable[[float, float, float, float, float, float, float, int], tuple[float, float]]
+    bound: bool
+
+
+def allowed_speed(d: float, brake: float, k1: float) -> tuple[float, float]:
+    """Evaluate v_adm(d), from which a joint still stops within d, and its slope dv_adm/dd."""
+    if d < 0.0:
+        x = k1 * d / RETURN_SPEED
+        return RETURN_SPEED * math.tanh(x), k1 / math.cosh(min(-x, 300.0)) ** 2
+    knee = brake / (k1 * k1)
+    if d <= knee:
+        return k1 * d, k1
+    v = math.sqrt(2.0 * brake * (d - 0.5 * knee))
+    return v, brake / v
+
+
+def admissible_command(
+    d: float,
+    towards: float,
+    brake: float,
+    most: float,
+    k1: float,
+    k2: float,
+    kp: float,
+    buffer: float,
+) -> float:
+    """Evaluate q̈_adm at distance d and speed ``towards``, for the largest speed ``most``."""
+    allowed, slope = allowed_speed(d, brake, k1)
+    return min(-towards * slope + k2 * (allowed - towards), k2 * (most - towards))
+
+
+def admissible_presence(
+    d: float,
+    towards: float,
+    brake: float,
+    buffer: float,
+    other: float,
+    command: float,
+    margin: float,
+    code: int,
+) -> tuple[float, float]:
+    """Rise with ``other``, and ask for the smaller of both: what happens anyway pushes nobody."""
+    return profile(code, (other - (command - margin)) / margin), min(other, command)
+
+
+def buffer_command(
+    d: float,
+    towards: float,
+    brake: float,
+    most: float,
+    k1: float,
+    k2: float,
+    kp: float,
+    buffer: float,
+) -> float:
+    """Evaluate f* of Eq. 24 with the inner edge of a position buffer as target."""
+    return kp * (d - buffer) - 2.0 * math.sqrt(kp) * towards
+
+
+def buffer_presence(
+    d: float,
+    towards: float,
+    brake: float,
+    buffer: float,
+    other: float,
+    command: float,
+    margin: float,
+    code: int,
+) -> tuple[float, float]:
+    """Rise with the position (Fig. 7) from the inner edge, which retreats by v²/2a, to the limit."""
+    ahead = max(towards, 0.0)
+    inner = buffer + ahead * ahead / (2.0 * brake)
+    return profile(code, (d - inner) / (0.0 - inner)), command
+
+
+LIMIT_LAWS: Mapping[str, LimitLaw] = MappingProxyType(
+    {
+        "admissible": LimitLaw(ADMISSIBLE, admissible_command, admissible_presence, bound=True),
+        "buffer": LimitLaw(BUFFER, buffer_command, buffer_presence, bound=False),
+    }
+)
+"""``admissible``: active when the stack is about to ask for more than the joint can still brake.
+``buffer``: active by position near the limit, as in Section 4.2 of the paper."""
+
+
+def limit_command(
+    code: int, d: float, towards: float, brake: float, most: float,
+    k1: float, k2: float, kp: float, buffer: float,
+) -> float:  # fmt: skip
+    """Evaluate the command of the law with this code."""
+    if code == BUFFER:
+        return buffer_command(d, towards, brake, most, k1, k2, kp, buffer)
+    return admissible_command(d, towards, brake, most, k1, k2, kp, buffer)
+
+
+def limit_presence(
+    code: int, d: float, towards: float, brake: float, buffer: float,
+    other: float, command: float, margin: float, profile_code: int,
+) -> tuple[float, float]:  # fmt: skip
+    """Evaluate activation and wish of the law with this code."""
+    if code == BUFFER:
+        return buffer_presence(d, towards, brake, buffer, other, command, margin, profile_code)
+    return admissible_presence(d, towards, brake, buffer, other, command, margin, profile_code)
+
+
 def rises(x: float, before: float) -> bool:
     """Tell whether a number is larger than before by more than its last bits."""
     return x - before > LAST_BITS * max(1.0, abs(x))
+
+
+# --- Tracking ----------------------------------------------------------------------------------------
+
+BRANCH_HOLD = 0.5 * math.pi
+"""How far past half a turn the direction chosen before is kept, rad. Noise and overshoot near half a
+turn are far smaller; at a full turn the direction would be lost, so it cannot be kept for ever."""
+
+LONGEST_WAY = math.cos(0.5 * (math.pi + BRANCH_HOLD))
+
+
+def goes_on(agreement: float, w: float) -> bool:
+    """Tell whether a rotation error goes on the long way round.
+
+    Args:
+        agreement: Product of its unit quaternion, w >= 0, with the one before.
+        w: Its real part; that of the long way round, cos(angle / 2), is −w.
+    """
+    return agreement < 0.0 and -w >= LONGEST_WAY
+
+
+def speed_scale(speed: float, limit: float) -> float:
+    """Factor on the error with which kp/kv · error is no faster than the limit (Khatib 1987)."""
+    return limit / speed if speed > limit else 1.0
+
+
+# --- Levels, motors, bounds --------------------------------------------------------------------------
+
+RANK_TOLERANCE = 1e-8
+"""Singular values of a projected level below this fraction of the level's largest unprojected one
+are rounding noise of the projection: 16 digits, halved by ill-conditioned levels above."""
+
+SHARE = 0.95
+"""Part of the torque that is left which a level may use. The rest is for the levels below: without it
+a level below would be all there or not at all as its torque at a saturated joint changes sign."""
+
+SCALED = 1e-12
+"""A level that gets less than one by more than this has given way."""
+
+SOFT = 1e-7
+"""How soft bounds on accelerations are; where they contradict each other or the motors, the excess is
+shared."""
+HARD = 1e-12
+"""How soft bounds on torques are: softer than rounding, harder than those on accelerations."""
+BROKEN = 1e-9
+"""A bound is broken by more than this part of itself, or by more than this."""
+LOST = 1e-3
+"""A bound that is still broken by more than this part of itself, or by more than this, is lost."""
+UNBOUNDED = 1e30
+"""Bounds beyond are none."""
+
+
+def room_for(part: np.ndarray, torque: np.ndarray, limit: np.ndarray) -> float:
+    """Largest s in [0, 1] with which every joint stays inside its share of what is left.
+
+        s = min(1, min_j SHARE (limit_j ∓ Γ_j) / |γ_j|),   the room in the direction of γ_j
+
+    s is continuous in Γ and γ as long as there is room, and s γ leaves at least 1 − SHARE of it; so a
+    chain of levels is continuous wherever the torque that it starts from is inside the limits. A level
+    that adds nothing takes nothing, whence levels may come and go.
+
+    Args:
+        part: (n,) torque γ that a level adds, N·m.
+        torque: (n,) torque Γ before it, inside the limits, N·m.
+        limit: (n,) largest torque of each joint, N·m; inf where there is none.
+
+    Returns:
+        s.
+    """
+    s = 1.0
+    for j in range(part.shape[0]):
+        if part[j] >= 0.0:
+            room, asked = SHARE * (limit[j] - torque[j]), part[j]
+        else:
+            room, asked = SHARE * (limit[j] + torque[j]), -part[j]
+        if asked > room:
+            s = min(s, room / asked)
+    return s

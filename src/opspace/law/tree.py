@@ -12,7 +12,7 @@ from jaxtyping import Float
 
 from opspace.law.blending import Weighted
 from opspace.law.hierarchy import Level, Partial, WhitenedTask, solve_level, stack_rows, start
-from opspace.law.saturation import room_for
+from opspace.law.scalars import room_for
 from opspace.law.singular_directions import (
     Alternative,
     LevelOutcome,

@@ -7,20 +7,18 @@ from collections.abc import Sequence
 import numpy as np
 
 from opspace.kernels.columns import (
-    ADMISSIBLE,
-    BUFFER,
+    LIMIT_BOUND,
     LIMIT_BUFFER,
     LIMIT_K1,
     LIMIT_K2,
     LIMIT_KP,
-    LIMIT_MODE,
+    LIMIT_LAW,
     LIMIT_PROFILE,
-    LIMIT_RETURN_SPEED,
     LIMIT_WEIGHT,
     Tick,
 )
 from opspace.kernels.limit_rows import DISTURBANCE, SIGN, SPEED
-from opspace.kernels.profiles import PROFILE_CODE
+from opspace.law import PROFILES
 from opspace.plan.memory import Sizes, make_tick, tick_handle
 from opspace.plan.pack_task import Packed
 from opspace.plan.scales import Scales
@@ -28,7 +26,6 @@ from opspace.robots.adapter import AdapterBase
 from opspace.robots.motion_axes import MotionAxes
 from opspace.stack import Member, Variable
 from opspace.tasks import JointLimits
-from opspace.tasks.joint_limits import RETURN_SPEED
 from opspace.tasks.task import CHANGES
 
 MOST = 62
@@ -143,17 +140,7 @@ class Plan:
     def _pack_variables(self) -> None:
         for row, variable in zip(self.tick.variable, self.variables, strict=True):
             ramp = (variable.presence if isinstance(variable, Member) else variable).ramp
-            row[:] = (
-                PROFILE_CODE[ramp.profile],
-                ramp.target,
-                ramp.start_time,
-                ramp.duration,
-                ramp.phase,
-                ramp.rate,
-                ramp.acceleration,
-                ramp.blend_time,
-                ramp.cruise,
-            )
+            row[:] = PROFILES.index(ramp.profile), *ramp.numbers
 
     def _pack_slots(self) -> None:
         tick = self.tick
@@ -198,9 +185,8 @@ def _pack_limits(limits: JointLimits, scales: Scales, tick: Tick) -> None:
             side.speed,
         )
     option = tick.option
-    option[LIMIT_MODE] = BUFFER if limits.mode == "buffer" else ADMISSIBLE
-    option[LIMIT_PROFILE] = PROFILE_CODE[limits.profile]
+    option[LIMIT_LAW], option[LIMIT_BOUND] = limits.law.code, limits.law.bound
+    option[LIMIT_PROFILE] = PROFILES.index(limits.profile)
     option[LIMIT_WEIGHT] = 1.0 / np.sqrt(scales.joint)
     option[[LIMIT_K1, LIMIT_K2, LIMIT_KP]] = limits.k1, limits.k2, limits.kp
-    option[LIMIT_RETURN_SPEED] = RETURN_SPEED
     option[LIMIT_BUFFER] = limits.buffer

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from opspace.errors import InputError
+from opspace.law.scalars import speed_scale
 from opspace.tasks.validation import Array, finite_array, numbers
 
 
@@ -54,9 +55,7 @@ class Gains:
         asked = speed_per_error(self.kp, self.kv) * error
         limited = error.copy()
         for rows, limit in zip(self.groups, max_speed, strict=True):
-            speed = math.hypot(*asked[rows])
-            if speed > limit:
-                limited[rows] *= limit / speed
+            limited[rows] *= speed_scale(math.hypot(*asked[rows]), limit)
         return limited
 
 

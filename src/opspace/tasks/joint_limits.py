@@ -11,20 +11,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from opspace.errors import InputError, unknown_name
+from opspace.law import PROFILES
+from opspace.law.scalars import LIMIT_LAWS, allowed_speed
 from opspace.tasks.validation import Array
 
 if TYPE_CHECKING:
     from opspace.robots.protocol import Robot
 
-MODES = ("admissible", "buffer")
-"""``admissible``: active when the stack is about to ask for more than the joint can still brake.
-``buffer``: active by position near the limit, as in Section 4.2 of the paper."""
-
 OWN_SPEEDS: Mapping[str, float] = MappingProxyType({})
 """The speed limits of the robot, none of them replaced."""
-
-RETURN_SPEED = 0.5
-"""Speed at which a joint that is outside its limits is brought back, rad/s or m/s."""
 
 
 @dataclass(frozen=True)
@@ -80,7 +75,7 @@ class JointLimits:
 
     Args:
         buffer: Width of the position buffer, rad or m; used in mode ``buffer``.
-        mode: One of `MODES`.
+        mode: A name in `opspace.law.scalars.LIMIT_LAWS`.
         joints: Limits (lower, upper) by joint name that replace the robot's own, rad or m.
         speeds: Largest speed by joint name in place of the robot's own, rad/s or m/s, inf for none;
             None limits no speed. Used in mode ``admissible``.
@@ -115,8 +110,8 @@ class JointLimits:
         brake_acceleration: float | None = None,
         profile: str = "quintic",
     ) -> None:
-        if mode not in MODES:
-            raise unknown_name("joint-limit mode", mode, MODES)
+        if mode not in LIMIT_LAWS:
+            raise unknown_name("joint-limit mode", mode, LIMIT_LAWS)
         if not (math.isfinite(buffer) and buffer > 0.0):
             raise InputError(f"joint limits: buffer must be above 0, got {buffer}")
         if brake_acceleration is not None and not (
@@ -133,10 +128,11 @@ class JointLimits:
         self.observer_time = observer_time
         self.clearance = float(clearance)
         self.mode = mode
+        self.law = LIMIT_LAWS[mode]
         self.profile = profile
         self.brake_acceleration = brake_acceleration
         self._joints = {name: _pair(name, limits) for name, limits in (joints or {}).items()}
-        self._limits_speed = speeds is not None and mode == "admissible"
+        self._limits_speed = speeds is not None and LIMIT_LAWS[mode].bound
         self._speeds = {name: _speed(name, speed) for name, speed in (speeds or {}).items()}
         self.sides: tuple[Side, ...] = ()
 
@@ -183,7 +179,7 @@ class JointLimits:
         return 0.25 * side.brake
 
     def admissible(self, side: Side, position: float, speed: float) -> float:
-        """Largest acceleration towards a limit from which the joint still stops at it.
+        """Acceleration towards a limit that its task set asks for, at most where the joint does less.
 
         Args:
             side: The limit.
@@ -191,46 +187,45 @@ class JointLimits:
             speed: Joint velocity (in the joint's own direction), rad/s or m/s.
 
         Returns:
-            q̈_adm, measured towards the limit.
+            q̈_adm; in mode ``buffer`` f* of Eq. 24 with the inner edge as target, rad/s² or m/s².
         """
-        distance = side.sign * (side.limit - position)
-        towards = side.sign * speed
-        allowed, slope = self._allowed_speed(distance, side.brake)
-        return min(
-            -towards * slope + self.k2 * (allowed - towards), self.k2 * (side.speed - towards)
+        d, towards = side.sign * (side.limit - position), side.sign * speed
+        return self.law.command(
+            d, towards, side.brake, side.speed, self.k1, self.k2, self.kp, self.buffer
         )
 
-    def allowed_speed(self, side: Side, distance: float) -> float:
-        """Speed towards a limit from which the joint still stops at it, v_adm(d), rad/s or m/s."""
-        return self._allowed_speed(distance, side.brake)[0]
-
-    def _allowed_speed(self, d: float, a: float) -> tuple[float, float]:
-        if d < 0.0:
-            x = self.k1 * d / RETURN_SPEED
-            return RETURN_SPEED * math.tanh(x), self.k1 / math.cosh(min(-x, 300.0)) ** 2
-        knee = a / self.k1**2
-        if d <= knee:
-            return self.k1 * d, self.k1
-        v = math.sqrt(2.0 * a * (d - 0.5 * knee))
-        return v, a / v
-
-    def pull_back(self, side: Side, position: float, speed: float) -> tuple[float, float, float]:
-        """Mode ``buffer``: acceleration towards the limit, and the buffer's inner and outer edge.
+    def presence(
+        self, side: Side, position: float, speed: float, other: float, command: float
+    ) -> tuple[float, float]:
+        """Activation of a limit's task set, and what it asks for.
 
         Args:
             side: The limit.
             position: Joint position, rad or m.
             speed: Joint velocity, rad/s or m/s.
+            other: Acceleration towards the limit that the joint has without this limit, rad/s².
+            command: What `admissible` gave, less what the model does not explain.
 
         Returns:
-            Commanded acceleration towards the limit (f* of Eq. 24 with the inner edge as target), and
-            the edges as distances from the limit, (inner, 0).
+            h, 0 to 1, and the acceleration towards the limit, rad/s².
         """
-        towards = side.sign * speed
-        inner = self.buffer + max(towards, 0.0) ** 2 / (2.0 * side.brake)
-        distance = side.sign * (side.limit - position)
-        command = self.kp * (distance - self.buffer) - 2.0 * math.sqrt(self.kp) * towards
-        return command, inner, 0.0
+        d, towards = side.sign * (side.limit - position), side.sign * speed
+        code = PROFILES.index(self.profile)
+        return self.law.presence(
+            d, towards, side.brake, self.buffer, other, command, self.margin(side), code
+        )
+
+    def allowed_speed(self, side: Side, distance: float) -> float:
+        """Speed towards a limit from which the joint still stops at it, v_adm(d), rad/s or m/s."""
+        return allowed_speed(distance, side.brake, self.k1)[0]
+
+    @property
+    def overridden(self) -> bool:
+        """Whether a subclass has a law of its own, which only the readable tick can call."""
+        return any(
+            getattr(type(self), name) is not getattr(JointLimits, name)
+            for name in ("admissible", "presence", "margin")
+        )
 
 
 def _speed(name: str, speed: float) -> float:

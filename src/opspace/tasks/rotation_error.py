@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import math
-
-from opspace.law.scalars import BRANCH_HOLD
+from opspace.law.scalars import goes_on
 from opspace.tasks.rotation import Quaternion, quaternion_from_matrix, rotation_vector
 from opspace.tasks.validation import Array
 
@@ -35,8 +33,7 @@ class RotationError:
         previous = self._previous
         if previous is not None:
             agreement = sum(a * b for a, b in zip(q, previous, strict=True))
-            # w = cos(angle / 2) of the long way round is −q[0].
-            if agreement < 0.0 and -q[0] >= math.cos(0.5 * (math.pi + BRANCH_HOLD)):
+            if goes_on(agreement, q[0]):
                 q = (-q[0], -q[1], -q[2], -q[3])
         self._previous = q
         return rotation_vector(q)
