@@ -32,21 +32,10 @@ _INSTANT = 1e-9
 class Profile:
     r"""A smooth step from 0 at s = 0 to 1 at s = 1, constant outside.
 
-    ========== =============================================== ==========
-    name       h(s)                                            smoothness
-    ========== =============================================== ==========
-    linear     s                                               C⁰
-    cubic      3 s² − 2 s³                                     C¹
-    quintic    10 s³ − 15 s⁴ + 6 s⁵                            C²
-    half-sine  ½ − ½ cos(π s)                                  C¹
-    tanh       ½ (1 + tanh(1/(1 − s) − 1/s))                   C^∞
-    step       0 below ½, 1 from there                         a jump
-    ========== =============================================== ==========
-
     The torque is as smooth in time as its activations, so quintic is the default everywhere.
 
     Args:
-        name: One of the names above.
+        name: One of `opspace.law.scalars.PROFILES`, which has formulas and smoothness.
 
     Raises:
         UnknownNameError: The name is not one of them.

@@ -17,8 +17,20 @@ import numpy as np
 # --- Activation profiles h(s) between s = 0 and s = 1, see `opspace.Profile` -------------------------
 
 PROFILES = ("linear", "cubic", "quintic", "half-sine", "tanh", "step")
-"""Names of the profiles; the place of a name is its code. ``step`` is the hard switch that all of this
-avoids, for comparisons."""
+"""Names of the profiles; the place of a name is its code.
+
+========== =============================================== ==========
+name       h(s)                                            smoothness
+========== =============================================== ==========
+linear     s                                               C⁰
+cubic      3 s² − 2 s³                                     C¹
+quintic    10 s³ − 15 s⁴ + 6 s⁵                            C²
+half-sine  ½ − ½ cos(π s)                                  C¹
+tanh       ½ (1 + tanh(1/(1 − s) − 1/s))                   C^∞
+step       0 below ½, 1 from there                         a jump
+========== =============================================== ==========
+
+``step`` is the hard switch that all of this avoids, for comparisons."""
 LINEAR, CUBIC, QUINTIC, HALF_SINE, TANH, STEP = range(6)
 
 TANH_EDGE = 4e-3
