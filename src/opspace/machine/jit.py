@@ -55,7 +55,7 @@ def _files(module: str, names: list[str]) -> list[Path]:
     return [path for path in (*here, *(place / f"{name}.py" for name in names)) if path.is_file()]
 
 
-def _stamp() -> str:
+def stamp() -> str:
     """Contents of everything that is compiled; times say nothing about them."""
     contents = hashlib.sha256()
     for path in sources():
@@ -63,7 +63,7 @@ def _stamp() -> str:
     return contents.hexdigest()
 
 
-STAMP = _stamp()
+STAMP = stamp()
 
 
 def jit(function: Callable[..., Any], *, counted: bool = False, nogil: bool = False) -> Any:

@@ -1,0 +1,62 @@
+"""What is kept of compiled code is as old as exactly what is frozen into it."""
+
+import ast
+import shutil
+
+import pytest
+
+from opspace.machine import jit
+
+
+def imports_of(path):
+    """Files of the package that a module names in its imports, read from its syntax tree."""
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("opspace"):
+            place = jit.PACKAGE.joinpath(*node.module.split(".")[1:])
+            yield from (place.with_suffix(".py"), place / "__init__.py")
+            yield from (place / f"{alias.name}.py" for alias in node.names)
+
+
+def test_whatever_kernels_import_counts():
+    found = set(jit.sources())
+    assert found >= set((jit.PACKAGE / "kernels").glob("*.py"))
+    for path in found - {jit.PACKAGE / "machine" / "jit.py", jit.PACKAGE / "machine" / "record.py"}:
+        assert {file for file in imports_of(path) if file.is_file()} <= found, path
+    assert jit.PACKAGE / "law" / "scalars.py" in found
+    assert not any("plan" in path.parts or "controller" in path.parts for path in found)
+
+
+@pytest.fixture
+def copy(tmp_path, monkeypatch):
+    package = tmp_path / "opspace"
+    shutil.copytree(jit.PACKAGE, package, ignore=shutil.ignore_patterns("__pycache__"))
+    monkeypatch.setattr(jit, "PACKAGE", package)
+    return package
+
+
+@pytest.mark.parametrize(
+    ("file", "old", "new"),
+    [
+        ("law/scalars.py", "BRANCH_HOLD = 0.5 * math.pi", "BRANCH_HOLD = 0.9 * math.pi"),
+        ("law/scalars.py", "RANK_TOLERANCE = 1e-8", "RANK_TOLERANCE = 1e-7"),
+        ("command.py", "DIRECTION_OFF = 1", "DIRECTION_OFF = 2"),
+        ("kernels/level.py", "NORMAL = 1e-4", "NORMAL = 1e-5"),
+        ("machine/jit.py", 'error_model="numpy"', 'error_model="python"'),
+    ],
+)
+def test_a_changed_constant_makes_what_is_kept_old(copy, file, old, new):
+    before = jit.stamp()
+    text = (copy / file).read_text(encoding="utf-8")
+    assert old in text
+    (copy / file).write_text(text.replace(old, new), encoding="utf-8")
+    assert jit.stamp() != before
+
+
+def test_times_and_plumbing_make_nothing_old(copy):
+    before = jit.stamp()
+    for path in copy.rglob("*.py"):
+        path.touch()
+    for file in ("plan/plan.py", "plan/pack_task.py", "controller/controller.py", "tasks/gains.py"):
+        text = (copy / file).read_text(encoding="utf-8")
+        (copy / file).write_text(text + "\nMORE = 1\n", encoding="utf-8")
+    assert jit.stamp() == before
