@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from opspace.errors import UnknownNameError, missing_extra, unknown_name
+from opspace.errors import missing_extra, unknown_name
 from opspace.robots.catalogue import CATALOGUE, SHIPPED, Entry, locate
 from opspace.robots.description import Description
 from opspace.robots.loading import SUFFIXES, read_robot
@@ -86,7 +86,7 @@ def _entry(name: str) -> Entry:
         return CATALOGUE[name]
     except KeyError:
         error = unknown_name("robot", name, CATALOGUE)
-        raise UnknownNameError(f"{error}; a robot file ends in {' or '.join(SUFFIXES)}") from None
+        raise error.reworded(f"{error}; a robot file ends in {' or '.join(SUFFIXES)}") from None
 
 
 def _named(description: Description, name: str, entry: Entry) -> Description:

@@ -70,7 +70,7 @@ class TrackingTask(Task):
         try:
             self._resolve(robot)
         except UnknownNameError as error:
-            raise UnknownNameError(f"task {self.name!r}: {error}") from None
+            raise error.reworded(f"task {self.name!r}: {error}") from None
         self._robot = robot
         self.reset()
 
