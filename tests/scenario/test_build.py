@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-import opspace.controller
+import opspace
 import opspace.sim
 import opspace.tasks
 from opspace.errors import ScenarioError
@@ -46,7 +46,7 @@ def entry_defaults(entry):
 @pytest.mark.parametrize(
     ("entry", "built"),
     [
-        (schema.SingularityEntry, opspace.controller.Singularity),
+        (schema.SingularityEntry, opspace.Singularity),
         (schema.JointLimitsEntry, opspace.tasks.JointLimits),
         (schema.PlantEntry, (opspace.sim.MujocoPlant, opspace.sim.Disturbances)),
         (schema.StopEntry, opspace.loop.StopRule),

@@ -126,6 +126,14 @@ class ReferenceController:
         self._handover: Handover | None = None
         self._observer = _observer(stack.limits, robot.nv, torque_limits)
 
+    def __repr__(self) -> str:
+        handled = "off" if self.singularity is None else repr(self.singularity)
+        return (
+            f"{type(self).__name__}({self._robot!r},\n"
+            f"bias={self.bias!r}, torque_limits={self.torque_limits!r}, singularity={handled},\n"
+            f"{self._stack!r})"
+        )
+
     def take_over(self, tau: ArrayLike, duration: float = 0.5) -> None:
         """Begin at the torque that is on the robot, and move to the controller's own.
 

@@ -6,7 +6,15 @@ import inspect
 import re
 from collections.abc import Mapping
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple, Union, get_type_hints
+from typing import (
+    TYPE_CHECKING,
+    Annotated,
+    Any,
+    Literal,
+    NamedTuple,
+    Union,
+    get_type_hints,
+)
 
 from pydantic import AfterValidator, Discriminator, Field, Tag, create_model, model_validator
 
@@ -89,11 +97,15 @@ class _Argument(NamedTuple):
     means: str
 
 
+def _nullable(takes: Any) -> Any:
+    return takes | None
+
+
 _ARGUMENTS: Mapping[str, _Argument] = {
     "axes": _Argument(
         Annotated[str, AfterValidator(_check_axes)], "axes to control, some of the letters xyz"
     ),
-    "frame": _Argument(str | None, "name of the frame; null is the robot's tool"),
+    "frame": _Argument(_nullable(str), "name of the frame; null is the robot's tool"),
     "reference_frame": _Argument(str, "name of the frame it is seen from"),
     "joint": _Argument(str, "name of the joint"),
     "joints": _Argument(
@@ -101,21 +113,21 @@ _ARGUMENTS: Mapping[str, _Argument] = {
         "names of the joints; null is every actuated joint",
     ),
     "kp_linear": _Argument(
-        BlockStiffness | None, "stiffness of the linear rows in place of kp [1/s²]"
+        _nullable(BlockStiffness), "stiffness of the linear rows in place of kp [1/s²]"
     ),
     "kp_angular": _Argument(
-        BlockStiffness | None, "stiffness of the angular rows in place of kp [1/s²]"
+        _nullable(BlockStiffness), "stiffness of the angular rows in place of kp [1/s²]"
     ),
     "axes_frame": _Argument(Literal["world", "tool"], "whose axes: world or tool"),
-    "offset": _Argument(Point | None, "point to control, in the frame's axes [m]"),
+    "offset": _Argument(_nullable(Point), "point to control, in the frame's axes [m]"),
 }
 """Arguments that mean the same in every task; others are read by their type."""
 
 _SPEED = "speed that the error may ask for"
 _CONTROLLED: Mapping[str, Mapping[str, _Argument]] = {
     controls: {
-        "target": _Argument(target | None, _TARGET),
-        "max_speed": _Argument(speed | None, f"{words}; null is no limit"),
+        "target": _Argument(_nullable(target), _TARGET),
+        "max_speed": _Argument(_nullable(speed), f"{words}; null is no limit"),
     }
     for controls, target, speed, words in (
         ("position", PointTarget, LinearSpeed, f"{_SPEED} [m/s]"),
@@ -158,12 +170,12 @@ def _by_type(kind: TaskKind, key: str) -> _Argument:
     """Read an argument by its annotation, and what it means in the docstring of its task."""
     hint = get_type_hints(kind.task.__init__)[key]
     choices = getattr(hint, "__args__", (hint,))
-    takes = next((_PLAIN[one] for one in choices if one in _PLAIN), None)
+    takes: Any = next((_PLAIN[one] for one in choices if one in _PLAIN), None)
     if takes is None:
         takes = Annotated[tuple[float, ...], Number("1", size="any")]
     found = re.search(rf"^ *{key}: (.+?)\.?$", kind.task.__doc__ or "", re.MULTILINE)
     means = found[1] if found else key
-    return _Argument(takes | None if type(None) in choices else takes, means)
+    return _Argument(_nullable(takes) if type(None) in choices else takes, means)
 
 
 ENTRIES: Mapping[str, type[TaskEntry]] = MappingProxyType(
