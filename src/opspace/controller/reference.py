@@ -129,9 +129,9 @@ class ReferenceController:
     def __repr__(self) -> str:
         handled = "off" if self.singularity is None else repr(self.singularity)
         return (
-            f"{type(self).__name__}({self._robot!r},\n"
-            f"bias={self.bias!r}, torque_limits={self.torque_limits!r}, singularity={handled},\n"
-            f"{self._stack!r})"
+            f"{type(self).__name__} of {self._robot!r}\n"
+            f"  bias={self.bias!r}, torque_limits={self.torque_limits!r}, singularity={handled}\n"
+            f"{self._stack!r}"
         )
 
     def take_over(self, tau: ArrayLike, duration: float = 0.5) -> None:
