@@ -127,6 +127,11 @@ class Command(NamedTuple):
     hard_solves: int
     report: Report
 
+    def __repr__(self) -> str:
+        present = ", ".join(f"{name} {task.activation:.2g}" for name, task in self.tasks.items())
+        size = float(np.linalg.norm(self.tau))
+        return f"Command(t={self.t:g} s, {self.status!s}, |tau|={size:.4g} N·m, tasks: {present})"
+
     @property
     def tasks(self) -> Mapping[str, TaskStatus]:
         """Status of each task in the stack by name."""

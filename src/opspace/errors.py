@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 from collections.abc import Iterable
 from pathlib import Path
+from typing import Any
 
 
 class OpspaceError(Exception):
@@ -16,7 +17,25 @@ class InputError(OpspaceError, ValueError):
 
 
 class UnknownNameError(OpspaceError):
-    """A name that does not exist; the message lists near matches and the valid choices."""
+    """A name that does not exist; the message lists near matches and the valid choices.
+
+    Attributes:
+        name: The name as given.
+        kind: What the name should have been, for example ``"frame"``.
+        choices: Every valid name, also those that the message leaves out.
+    """
+
+    def __init__(
+        self, message: str, *, name: str = "", kind: str = "", choices: Iterable[str] = ()
+    ) -> None:
+        super().__init__(message)
+        self.name = name
+        self.kind = kind
+        self.choices = tuple(choices)
+
+    def reworded(self, message: str) -> UnknownNameError:
+        """Say the same in a context that the message tells."""
+        return UnknownNameError(message, name=self.name, kind=self.kind, choices=self.choices)
 
 
 class ModelError(OpspaceError):
@@ -56,6 +75,10 @@ class ScenarioError(OpspaceError):
         self.line = line
         self.key = key
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Be copied with the message as it is, which a second construction would prefix again."""
+        return self.__class__.__new__, (self.__class__, *self.args), self.__dict__
+
 
 def unknown_name(
     kind: str, name: str, choices: Iterable[str], listed: Iterable[str] | None = None
@@ -76,7 +99,10 @@ def unknown_name(
     hint = f"; did you mean {' or '.join(repr(n) for n in near)}?" if near else ""
     shown = valid if listed is None else list(listed)
     return UnknownNameError(
-        f"unknown {kind} {name!r}{hint} (valid: {', '.join(shown) if shown else 'none'})"
+        f"unknown {kind} {name!r}{hint} (valid: {', '.join(shown) if shown else 'none'})",
+        name=name,
+        kind=kind,
+        choices=valid,
     )
 
 

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-import opspace.plan.scales
+import opspace
 import opspace.sim
 import opspace.tasks
 from opspace.errors import ScenarioError
@@ -15,8 +15,10 @@ from opspace.law import PROFILES
 from opspace.robots import load_robot
 from opspace.scenario import load_scenario, scenario_from, schema
 from opspace.scenario.build import build
-from opspace.scenario.build_tasks import KINDS, build_tasks
+from opspace.scenario.build_tasks import build_tasks
 from opspace.scenario.document import parse
+from opspace.scenario.task_entries import ENTRIES
+from opspace.tasks import TASK_KINDS
 from tests.scenario.examples import EVERYTHING
 from tests.scenario.short import HOLD, short
 
@@ -44,11 +46,11 @@ def entry_defaults(entry):
 @pytest.mark.parametrize(
     ("entry", "built"),
     [
-        (schema.Singularity, opspace.plan.scales.Singularity),
-        (schema.JointLimits, opspace.tasks.JointLimits),
-        (schema.Plant, (opspace.sim.MujocoPlant, opspace.sim.Disturbances)),
-        (schema.Stop, opspace.loop.StopRule),
-        *KINDS.items(),
+        (schema.SingularityEntry, opspace.Singularity),
+        (schema.JointLimitsEntry, opspace.tasks.JointLimits),
+        (schema.PlantEntry, (opspace.sim.MujocoPlant, opspace.sim.Disturbances)),
+        (schema.StopEntry, opspace.loop.StopRule),
+        *((ENTRIES[name], kind.task) for name, kind in TASK_KINDS.items()),
     ],
 )
 def test_the_schema_has_the_defaults_of_what_is_built(entry, built):

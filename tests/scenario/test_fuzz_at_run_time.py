@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 import opspace as osc
 from opspace.errors import OpspaceError
-from opspace.plots.columns import plot_columns
+from opspace.plots.plot_columns import plot_columns
 from opspace.record.format import DATA, END, HEADER, META
 from opspace.runs.replay_run import replay
 from opspace.scenario.build import build

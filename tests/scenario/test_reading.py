@@ -17,23 +17,23 @@ from opspace.scenario import (
     scenario_from,
     schema,
     shipped_scenarios,
-    task_entries,
     to_dict,
 )
 from opspace.scenario.document import parse
+from opspace.scenario.task_entries import ENTRIES
 from opspace.stack.groups import EXACT
 from tests.scenario.examples import EVERYTHING, scenarios
 
 TASKS = {
-    "position": (task_entries.Position, tasks.PositionTask),
-    "orientation": (task_entries.Orientation, tasks.OrientationTask),
-    "pose": (task_entries.Pose, tasks.PoseTask),
-    "posture": (task_entries.Posture, tasks.PostureTask),
-    "joint": (task_entries.Joint, tasks.JointTask),
-    "com": (task_entries.Com, tasks.ComTask),
-    "relative_position": (task_entries.RelativePosition, tasks.RelativePositionTask),
-    "relative_orientation": (task_entries.RelativeOrientation, tasks.RelativeOrientationTask),
-    "relative_pose": (task_entries.RelativePose, tasks.RelativePoseTask),
+    "position": (ENTRIES["position"], tasks.PositionTask),
+    "orientation": (ENTRIES["orientation"], tasks.OrientationTask),
+    "pose": (ENTRIES["pose"], tasks.PoseTask),
+    "posture": (ENTRIES["posture"], tasks.PostureTask),
+    "joint": (ENTRIES["joint"], tasks.JointTask),
+    "com": (ENTRIES["com"], tasks.ComTask),
+    "relative_position": (ENTRIES["relative_position"], tasks.RelativePositionTask),
+    "relative_orientation": (ENTRIES["relative_orientation"], tasks.RelativeOrientationTask),
+    "relative_pose": (ENTRIES["relative_pose"], tasks.RelativePoseTask),
 }
 
 
@@ -119,7 +119,7 @@ def choices(model, key):
 def test_choices_are_those_of_the_library():
     assert choices(schema.Scenario, "blending") == tuple(EXACT)
     assert choices(schema.Scenario, "backend") == BACKENDS
-    assert choices(schema.Singularity, "profile") == PROFILES
+    assert choices(schema.SingularityEntry, "profile") == PROFILES
 
 
 def entries(model):

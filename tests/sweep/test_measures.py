@@ -6,7 +6,7 @@ from tests.scenario.short import short
 
 from opspace.command import Command, Found, Status
 from opspace.scenario.build import build
-from opspace.sweep.limit_measures import Watch
+from opspace.sweep.limit_measures import LimitWatch
 
 LIMITS = {"joints": {"joint1": [-0.5, 0.5]}, "speeds": {"joint1": 1.0}, "clearance": 0.02}
 
@@ -14,7 +14,7 @@ LIMITS = {"joints": {"joint1": [-0.5, 0.5]}, "speeds": {"joint1": 1.0}, "clearan
 def watched(*ticks, pushes=()):
     """Numbers of a run that joint 1 spends at these positions and speeds, with these statuses."""
     built = build(short(joint_limits=LIMITS, plant={"pushes": list(pushes)}))
-    watch, rest = Watch(built), built.plant.q
+    watch, rest = LimitWatch(built), built.plant.q
     for i, (q, v, status) in enumerate(ticks):
         built.plant.data.qpos[:] = np.r_[q, rest[1:]]
         built.plant.data.qvel[:] = np.r_[v, np.zeros(5)]

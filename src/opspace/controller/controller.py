@@ -14,7 +14,7 @@ from opspace.controller.batch import Batch, check_members, checked_states, cores
 from opspace.controller.disturbance import DisturbanceObserver
 from opspace.controller.reference import ReferenceController
 from opspace.controller.warm_up import compiled_batch, compiled_tick, tick_entry
-from opspace.controller.watchdog import Timing
+from opspace.controller.watchdog import Watchdog
 from opspace.errors import InputError
 from opspace.kernels.columns import (
     DAMPING,
@@ -49,7 +49,7 @@ _Fixed: TypeAlias = tuple[
     AdapterBase,
     Callable[[ArrayLike, ArrayLike], None],
     Callable[[], None] | None,
-    Timing | None,
+    Watchdog | None,
     Callable[[float], tuple[Member, ...]],
     DisturbanceObserver | None,
     Callable[[float, Handle], int],

@@ -20,7 +20,7 @@ from opspace.controller.limit_task_sets import (
     limit_terms,
 )
 from opspace.controller.reference_report import level_status, task_status
-from opspace.controller.watchdog import Timing
+from opspace.controller.watchdog import Watchdog
 from opspace.errors import InputError, unknown_name
 from opspace.law import (
     LawInfo,
@@ -116,7 +116,7 @@ class ReferenceController:
         self.torque_limits = torque_limits
         if period is None and on_time_jump != "report":
             raise InputError(f"on_time_jump={on_time_jump!r} needs the period of the ticks")
-        self._timing = None if period is None else Timing(period, on_time_jump)
+        self._timing = None if period is None else Watchdog(period, on_time_jump)
         self._motors: Motors | None = None
         self._scales = Scales(robot, singularity)
         stack.attach(self._scales.prepare)
@@ -125,6 +125,14 @@ class ReferenceController:
             stack.limits.bind(robot, self.calibration.brake)
         self._handover: Handover | None = None
         self._observer = _observer(stack.limits, robot.nv, torque_limits)
+
+    def __repr__(self) -> str:
+        handled = "off" if self.singularity is None else repr(self.singularity)
+        return (
+            f"{type(self).__name__} of {self._robot!r}\n"
+            f"  bias={self.bias!r}, torque_limits={self.torque_limits!r}, singularity={handled}\n"
+            f"{self._stack!r}"
+        )
 
     def take_over(self, tau: ArrayLike, duration: float = 0.5) -> None:
         """Begin at the torque that is on the robot, and move to the controller's own.

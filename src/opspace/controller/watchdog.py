@@ -19,7 +19,7 @@ JUMP = 10.0
 """Time that moves by more than this many periods has jumped."""
 
 
-class Timing:
+class Watchdog:
     """Watches the time and the state of every tick.
 
     Args:

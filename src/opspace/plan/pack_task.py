@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from inspect import isfunction
 from typing import Any
 
 import numpy as np
@@ -46,8 +47,9 @@ from opspace.kernels.columns import (
 from opspace.robots.adapter import AdapterBase
 from opspace.robots.motion_axes import FramePlace, MotionAxes
 from opspace.stack import Member
-from opspace.tasks import PostureTask, Task
+from opspace.tasks import TASK_KINDS, PostureTask, Task
 from opspace.tasks.activations import own_activation
+from opspace.tasks.gains import Gains
 from opspace.tasks.motion_task import MotionTask
 from opspace.tasks.motions import CenterOfMass, RelativeFrame, WorldFrame
 from opspace.tasks.quantities import Orientation, Pose, Position
@@ -56,15 +58,51 @@ QUANTITIES = {Position: POSITION, Orientation: ORIENTATION, Pose: POSE}
 SOURCES = {WorldFrame: WORLD, RelativeFrame: RELATIVE, CenterOfMass: CENTRE_OF_MASS}
 
 
+HONOURED = {
+    "activation",
+    "bind",
+    "reset",
+    "row_axes",
+    "_resolve",
+    "_recheck",
+    "_words",
+    "_abc_impl",
+}
+"""What a subclass may override and still be computed from numbers: either form calls it, or no tick
+does."""
+PACKED_ONCE = ("source", "quantity", "selection", "in_tool_axes", "layout", "rows")
+"""Attributes that a subclass may not compute anew, as a property would."""
+
+
 def kind_of(task: Task) -> int:
-    """Tell whether a task is one that the compiled tick evaluates, and which."""
-    method = type(task).evaluate
-    if isinstance(task, MotionTask) and method is MotionTask.evaluate:
-        known = type(task.source) in SOURCES and type(task.quantity) in QUANTITIES
-        return MOTION if known else OWN
-    if isinstance(task, PostureTask) and method is PostureTask.evaluate:
+    """Tell whether a task is one that the compiled tick evaluates, and which.
+
+    It is one by exact type, or as a subclass that overrides nothing that a tick asks a task for.
+    """
+    kind = type(task)
+    known = {one.task for one in TASK_KINDS.values()} | {MotionTask, PostureTask}
+    built_in = next((base for base in kind.__mro__ if base in known), None)
+    if built_in is None or _overrides(task, built_in) or type(task._gains) is not Gains:
+        return OWN
+    if isinstance(task, PostureTask):
         return JOINTS
-    return OWN
+    assert isinstance(task, MotionTask)
+    known_parts = type(task.source) in SOURCES and type(task.quantity) in QUANTITIES
+    return MOTION if known_parts else OWN
+
+
+def _overrides(task: Task, built_in: type[Task]) -> bool:
+    """Tell whether a task has anything of its own where a tick would ask the built-in one."""
+    kind = type(task)
+    own = {name for name in vars(task) if isfunction(getattr(built_in, name, None))}
+    if kind is not built_in:
+        asked = {name for name in dir(built_in) if not name.startswith("__")}
+        own |= {
+            name
+            for name in (*asked, *PACKED_ONCE, "_target", "_held", "_gains", "__getattribute__")
+            if getattr(kind, name, None) is not getattr(built_in, name, None)
+        }
+    return bool(own - HONOURED)
 
 
 class Packed:
@@ -86,7 +124,8 @@ class Packed:
         self.task: Any = task
         self.index = index
         self.rows = slice(first, first + task.rows)
-        self.own_kind = kind_of(task) == OWN
+        code = kind_of(task)
+        self.own_kind = code == OWN
         self.moving = True
         self._timed = False
         self._own_activation = False
@@ -96,7 +135,7 @@ class Packed:
         self.gains: object = None
         kind = tick.kind[index]
         kind[:] = np.zeros(KIND_SIZE)
-        kind[[KIND, FIRST_ROW, ROWS]] = kind_of(task), first, task.rows
+        kind[[KIND, FIRST_ROW, ROWS]] = code, first, task.rows
         covers = isinstance(task, PostureTask) and task.rows == axes.v.size
         kind[COVERS_ALL] = int(covers)
         tick.numbers[index] = np.zeros(NUMBERS_SIZE)

@@ -60,6 +60,18 @@ class AdapterBase(ABC):
         self._cache: dict[tuple[str, int], np.ndarray] = {}
         self._behind = False
 
+    def __repr__(self) -> str:
+        names = (
+            self.joint_names
+            if self.nv <= 8
+            else (*self.joint_names[:3], "...", self.joint_names[-1])
+        )
+        base = ", floating base" if self.floating_base else ""
+        return (
+            f"{type(self).__name__}({self.name!r}{base}, {self.nv} joints: {', '.join(names)}; "
+            f"tool {self.tool!r})"
+        )
+
     @property
     def q(self) -> np.ndarray:
         """Return the configuration of the last update, (nq,), quaternions normalised."""

@@ -12,7 +12,7 @@ PACKAGE = "example-robot-data"
 
 
 @dataclass(frozen=True)
-class Entry:
+class CatalogueEntry:
     """A robot by name.
 
     Attributes:
@@ -43,7 +43,7 @@ class Entry:
         return self.kind != "arm"
 
 
-def locate(entry: Entry) -> Path | None:
+def locate(entry: CatalogueEntry) -> Path | None:
     """Find a robot's file without importing anything.
 
     Args:
@@ -96,20 +96,20 @@ _G1_SIDE = {
     "elbow": 0.7,
 }
 
-CATALOGUE: dict[str, Entry] = {
-    "puma560": Entry(
+CATALOGUE: dict[str, CatalogueEntry] = {
+    "puma560": CatalogueEntry(
         "puma560.xml", 6, "Unimation PUMA 560, published parameters, own MJCF", package=SHIPPED
     ),
-    "ur3": Entry(
+    "ur3": CatalogueEntry(
         "ur_description/urdf/ur3_robot.urdf", 6, "Universal Robots UR3", "tool0", _UR_POSTURE
     ),
-    "ur5": Entry(
+    "ur5": CatalogueEntry(
         "ur_description/urdf/ur5_robot.urdf", 6, "Universal Robots UR5", "tool0", _UR_POSTURE
     ),
-    "ur10": Entry(
+    "ur10": CatalogueEntry(
         "ur_description/urdf/ur10_robot.urdf", 6, "Universal Robots UR10", "tool0", _UR_POSTURE
     ),
-    "panda": Entry(
+    "panda": CatalogueEntry(
         "panda_description/urdf/panda.urdf",
         7,
         "Franka Emika Panda, fingers closed",
@@ -117,21 +117,21 @@ CATALOGUE: dict[str, Entry] = {
         _numbered("panda_joint", 0.0, -0.785398, 0.0, -2.35619, 0.0, 1.5707, 0.785398),
         locked_joints=("panda_finger_joint1", "panda_finger_joint2"),
     ),
-    "kinova": Entry(
+    "kinova": CatalogueEntry(
         "kinova_description/robots/kinova.urdf",
         6,
         "Kinova Jaco 2 (j2s6s200), fingers fixed",
         "j2s6s200_end_effector",
         _numbered("j2s6s200_joint_", 1.5707, 2.618, -1.5707 + 2 * 3.14159265, 3.1415, 2.618, 0.0),
     ),
-    "xarm7": Entry(
+    "xarm7": CatalogueEntry(
         "xarm_description/urdf/xarm7.urdf",
         7,
         "UFACTORY xArm 7",
         "link_eef",
         _numbered("joint", 0.0, -0.3, 0.0, 1.2, 0.0, 1.5, 0.0),
     ),
-    "z1": Entry(
+    "z1": CatalogueEntry(
         "z1_description/urdf/z1.urdf",
         6,
         "Unitree Z1, gripper closed",
@@ -139,7 +139,7 @@ CATALOGUE: dict[str, Entry] = {
         _numbered("joint", 0.0, 1.3, -1.4, 0.6, 0.6, 0.0),
         locked_joints=("jointGripper",),
     ),
-    "so101": Entry(
+    "so101": CatalogueEntry(
         "so_arm_description/urdf/so101.urdf",
         5,
         "SO-101 hobby arm, jaw fixed",
@@ -147,7 +147,7 @@ CATALOGUE: dict[str, Entry] = {
         {"shoulder_lift": -0.4, "elbow_flex": 0.6, "wrist_flex": 0.8},
         locked_joints=("gripper",),
     ),
-    "talos": Entry(
+    "talos": CatalogueEntry(
         "talos_data/robots/talos_reduced.urdf",
         36,
         "PAL Robotics Talos humanoid, grippers closed",
@@ -158,7 +158,7 @@ CATALOGUE: dict[str, Entry] = {
         locked_joints=("gripper_left_joint", "gripper_right_joint"),
         kind="humanoid",
     ),
-    "g1": Entry(
+    "g1": CatalogueEntry(
         "g1_description/urdf/g1_29dof_rev_1_0.urdf",
         35,
         "Unitree G1 humanoid",
@@ -167,7 +167,7 @@ CATALOGUE: dict[str, Entry] = {
         0.763,
         kind="humanoid",
     ),
-    "go2": Entry(
+    "go2": CatalogueEntry(
         "go2_description/urdf/go2.urdf",
         18,
         "Unitree Go2 quadruped",
@@ -177,7 +177,7 @@ CATALOGUE: dict[str, Entry] = {
         0.335,
         kind="quadruped",
     ),
-    "solo12": Entry(
+    "solo12": CatalogueEntry(
         "solo_description/robots/solo12.urdf",
         18,
         "Open Dynamic Robot Initiative Solo-12 quadruped",

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from opspace.errors import UnknownNameError, missing_extra, unknown_name
-from opspace.robots.catalogue import CATALOGUE, SHIPPED, Entry, locate
+from opspace.errors import missing_extra, unknown_name
+from opspace.robots.catalogue import CATALOGUE, SHIPPED, CatalogueEntry, locate
 from opspace.robots.description import Description
 from opspace.robots.loading import SUFFIXES, read_robot
 from opspace.robots.protocol import Robot
@@ -81,15 +81,15 @@ def load_robot(
     return file.build(_named(file.description, name_or_path, entry))
 
 
-def _entry(name: str) -> Entry:
+def _entry(name: str) -> CatalogueEntry:
     try:
         return CATALOGUE[name]
     except KeyError:
         error = unknown_name("robot", name, CATALOGUE)
-        raise UnknownNameError(f"{error}; a robot file ends in {' or '.join(SUFFIXES)}") from None
+        raise error.reworded(f"{error}; a robot file ends in {' or '.join(SUFFIXES)}") from None
 
 
-def _named(description: Description, name: str, entry: Entry) -> Description:
+def _named(description: Description, name: str, entry: CatalogueEntry) -> Description:
     """Apply the catalogue's name, tool and posture; the shipped files have their own."""
     if entry.package == SHIPPED:
         return replace(description, name=name)

@@ -46,7 +46,7 @@ class JointReport:
 
 
 @dataclass(frozen=True)
-class Report:
+class RobotCheck:
     """A robot as the controller sees it.
 
     Attributes:
@@ -73,7 +73,7 @@ class Report:
     warnings: tuple[str, ...]
 
 
-def check_robot(robot: Robot) -> Report:
+def check_robot(robot: Robot) -> RobotCheck:
     """Ask a controller with default settings what it makes of a robot.
 
     Args:
@@ -99,7 +99,7 @@ def check_robot(robot: Robot) -> Report:
         warnings += _singular(task, sigma[task.name], option)
     robot.update(robot.q_reference, np.zeros(robot.nv))
     joints = _joints(robot, calibration)
-    return Report(
+    return RobotCheck(
         robot=robot.name,
         source=str(robot.source),
         dof=robot.nv,
@@ -112,7 +112,7 @@ def check_robot(robot: Robot) -> Report:
     )
 
 
-def to_plain(report: Report) -> dict[str, Any]:
+def to_plain(report: RobotCheck) -> dict[str, Any]:
     """Write a report in JSON's types.
 
     Args:

@@ -2,35 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 
-from opspace import tasks
 from opspace.errors import InputError, OpspaceError, UnknownNameError, unknown_name
 from opspace.robots.protocol import Robot
-from opspace.scenario import task_entries as entries
 from opspace.scenario.document import Key
-from opspace.scenario.references import Space, as_reference, build_target, rotations, vectors
+from opspace.scenario.references import Values, as_reference, build_target, rotations, vectors
 from opspace.scenario.schema import Scenario
 from opspace.scenario.targets import PoseParts
+from opspace.scenario.task_entries import TaskEntry
+from opspace.tasks import TASK_KINDS, PoseReference, PostureTask
 from opspace.tasks.joint_layout import joint_layout
-from opspace.tasks.motions import CenterOfMass, MotionSource, RelativeFrame, WorldFrame
+from opspace.tasks.motion_task import MotionTask
 from opspace.tasks.tracking import TrackingTask
 from opspace.tasks.validation import Array
-
-KINDS: Mapping[type[entries.TaskEntry], type[TrackingTask]] = {
-    entries.Position: tasks.PositionTask,
-    entries.Orientation: tasks.OrientationTask,
-    entries.Pose: tasks.PoseTask,
-    entries.Posture: tasks.PostureTask,
-    entries.Joint: tasks.JointTask,
-    entries.Com: tasks.ComTask,
-    entries.RelativePosition: tasks.RelativePositionTask,
-    entries.RelativeOrientation: tasks.RelativeOrientationTask,
-    entries.RelativePose: tasks.RelativePoseTask,
-}
 
 _NOT_OPTIONS = ("type", "level", "present", "target")
 
@@ -56,12 +44,12 @@ def build_tasks(scenario: Scenario, robot: Robot) -> dict[str, TrackingTask]:
             key: getattr(entry, key) for key in type(entry).model_fields if key not in _NOT_OPTIONS
         }
         try:
-            task = KINDS[type(entry)](**options, name=name)
+            task = TASK_KINDS[entry.type].task(**options, name=name)
             task.bind(robot)
         except OpspaceError as error:
             raise scenario.error(("tasks", name), str(error)) from error
         try:
-            task.target = _target(entry, robot)
+            task.target = _target(task, entry, robot)
         except OpspaceError as error:
             raise scenario.error(("tasks", name, "target"), str(error)) from error
         built[name] = task
@@ -89,7 +77,7 @@ def configuration(value: str | tuple[float, ...], robot: Robot) -> Array:
     return np.array(known[value])
 
 
-def _unknown_names(entry: entries.TaskEntry, robot: Robot) -> Iterator[tuple[Key, str]]:
+def _unknown_names(entry: TaskEntry, robot: Robot) -> Iterator[tuple[Key, str]]:
     """Find names of frames and joints that the robot does not have."""
     for key in ("frame", "reference_frame"):
         frame = getattr(entry, key, None)
@@ -105,53 +93,31 @@ def _unknown_names(entry: entries.TaskEntry, robot: Robot) -> Iterator[tuple[Key
             yield key, str(error)
 
 
-def _target(entry: entries.TaskEntry, robot: Robot) -> Any:
-    match entry:
-        case entries.Joint():
-            start = robot.q[joint_layout(robot, [entry.joint]).entries]
+def _target(task: TrackingTask, entry: TaskEntry, robot: Robot) -> Any:
+    controls = TASK_KINDS[entry.type].controls
+    if isinstance(task, PostureTask):
+        layout = task.layout
+        assert layout is not None  # bound
+        start = robot.q[layout.entries]
+        if controls == "joint":
             return build_target(entry.target, vectors(start, np.atleast_1d))
-        case entries.Posture():
-            return build_target(entry.target, _posture(entry, robot))
-    motion = _source(entry)
-    motion.bind(robot)
-    found = motion.measure(robot)
-    match entry:
-        case entries.Orientation() | entries.RelativeOrientation():
-            return build_target(entry.target, rotations(found.rotation))
-        case entries.Pose() | entries.RelativePose():
-            return _pose(entry.target, vectors(found.position), rotations(found.rotation))
-        case entries.Position() | entries.RelativePosition() | entries.Com():
-            return build_target(entry.target, vectors(found.position))
-        case _:
-            raise AssertionError(entry)
+
+        def read(value: str | tuple[float, ...]) -> Array:
+            return layout.select(configuration(value, robot), "target")
+
+        return build_target(entry.target, vectors(start, read))
+    assert isinstance(task, MotionTask)
+    found = task.source.measure(robot)
+    position, rotation = vectors(found.position), rotations(found.rotation)
+    if controls == "pose":
+        return _pose(entry.target, position, rotation)
+    return build_target(entry.target, position if controls == "position" else rotation)
 
 
-def _source(entry: entries.TaskEntry) -> MotionSource:
-    match entry:
-        case entries.RelativePosition() | entries.RelativeOrientation() | entries.RelativePose():
-            return RelativeFrame(entry.frame, entry.reference_frame)
-        case entries.Position() | entries.Pose():
-            offset = None if entry.offset is None else np.asarray(entry.offset)
-            return WorldFrame(entry.frame, offset)
-        case entries.Orientation():
-            return WorldFrame(entry.frame)
-        case _:
-            return CenterOfMass()
-
-
-def _posture(entry: entries.Posture, robot: Robot) -> Space:
-    layout = joint_layout(robot, entry.joints)
-
-    def read(value: str | tuple[float, ...]) -> Array:
-        return layout.select(configuration(value, robot), "target")
-
-    return vectors(robot.q[layout.entries], read)
-
-
-def _pose(target: PoseParts | tuple[float, ...] | None, position: Space, rotation: Space) -> Any:
+def _pose(target: PoseParts | tuple[float, ...] | None, position: Values, rotation: Values) -> Any:
     if not isinstance(target, PoseParts):
         return target
-    return tasks.PoseReference(
+    return PoseReference(
         as_reference(build_target(target.position, position), position),
         as_reference(build_target(target.orientation, rotation), rotation),
     )

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
-from opspace.scenario.fields import Checked, Entry, Quantity, listed, problem, shown
+from opspace.scenario.fields import Checked, Entry, Number, listed, problem, shown
 from opspace.scenario.task_entries import AnyTask
 
 if TYPE_CHECKING:
@@ -38,19 +38,19 @@ class Event(Entry):
     A task whose first event is ``insert`` is not in the stack before it.
     """
 
-    at: Annotated[float, Quantity("s", at_least=0.0)] = Field(description="when it starts [s]")
+    at: Annotated[float, Number("s", at_least=0.0)] = Field(description="when it starts [s]")
     insert: str | None = Field(default=None, description="task that comes")
     remove: str | None = Field(default=None, description="task that goes")
     move: str | None = Field(default=None, description="task that gets another level")
     swap: Annotated[tuple[str, str], Checked(_pair)] | None = Field(
         default=None, description="two tasks that exchange their levels"
     )
-    level: Annotated[float, Quantity("1")] | None = Field(
+    level: Annotated[float, Number("1")] | None = Field(
         default=None,
         description="number of the level, for insert (null: the task's own) and move; "
         "0.5 lies between 0 and 1",
     )
-    duration: Annotated[float, Quantity("s", at_least=0.0)] = Field(
+    duration: Annotated[float, Number("s", at_least=0.0)] = Field(
         default=0.5, description="how long it takes [s]; 0 is a hard switch"
     )
     profile: ProfileName = Field(default="quintic", description="shape of the activation in time")

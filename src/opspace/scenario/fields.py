@@ -99,8 +99,8 @@ class Entry(BaseModel):
 
 
 @dataclass(frozen=True)
-class Quantity:
-    """A number with unit and range; used as ``Annotated[float, Quantity("s", above=0.0)]``.
+class Number:
+    """A number with unit and range; used as ``Annotated[float, Number("s", above=0.0)]``.
 
     Attributes:
         unit: SI unit, ``1`` for none.

@@ -10,7 +10,7 @@ from typing import Any
 from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
-from opspace.errors import ScenarioError, UnknownNameError, unknown_name
+from opspace.errors import ScenarioError, unknown_name
 from opspace.scenario.document import Document, Key, parse, to_yaml
 from opspace.scenario.fields import PROBLEM, listed, shown
 from opspace.scenario.overrides import apply_overrides
@@ -98,7 +98,7 @@ def _path(source: str | Path) -> Path:
         return path
     if source not in shipped_scenarios():
         error = unknown_name("scenario", source, shipped_scenarios())
-        raise UnknownNameError(f"{error}; a scenario file ends in {' or '.join(SUFFIXES)}")
+        raise error.reworded(f"{error}; a scenario file ends in {' or '.join(SUFFIXES)}")
     return _LIBRARY / f"{source}.yaml"
 
 

@@ -28,7 +28,7 @@ Move = Callable[[Array, Array, float, float], Reference]
 
 
 @dataclass(frozen=True)
-class Space:
+class Values:
     """The values that a task can have.
 
     Attributes:
@@ -44,7 +44,7 @@ class Space:
     move: Move
 
 
-def vectors(start: Array, read: Callable[[Any], Array] = np.asarray) -> Space:
+def vectors(start: Array, read: Callable[[Any], Array] = np.asarray) -> Values:
     """Values that are added: points, joint positions.
 
     Args:
@@ -54,10 +54,10 @@ def vectors(start: Array, read: Callable[[Any], Array] = np.asarray) -> Space:
     Returns:
         The space.
     """
-    return Space(start, read, lambda value, offset: value + np.asarray(offset), MinimumJerk)
+    return Values(start, read, lambda value, offset: value + np.asarray(offset), MinimumJerk)
 
 
-def rotations(start: Array) -> Space:
+def rotations(start: Array) -> Values:
     """Orientations; an offset is a rotation vector in the axes of the target.
 
     Args:
@@ -66,7 +66,7 @@ def rotations(start: Array) -> Space:
     Returns:
         The space.
     """
-    return Space(start, lambda value: as_rotation(value, "goal"), _turned, OrientationMinimumJerk)
+    return Values(start, lambda value: as_rotation(value, "goal"), _turned, OrientationMinimumJerk)
 
 
 def _turned(R: Array, offset: Any) -> Array:
@@ -76,7 +76,7 @@ def _turned(R: Array, offset: Any) -> Array:
     return exp_rotation(phi) @ R
 
 
-def build_target(target: Any, space: Space) -> Array | Reference | None:
+def build_target(target: Any, space: Values) -> Array | Reference | None:
     """Build a value or a reference.
 
     Args:
@@ -95,7 +95,7 @@ def build_target(target: Any, space: Space) -> Array | Reference | None:
     return None if target is None else space.read(target)
 
 
-def as_reference(found: Array | Reference | None, space: Space) -> Reference:
+def as_reference(found: Array | Reference | None, space: Values) -> Reference:
     """Turn what ``build_target`` gives into a reference, a value into one that stays."""
     if callable(found):
         return found
@@ -105,19 +105,19 @@ def as_reference(found: Array | Reference | None, space: Space) -> Reference:
 
 def return_time(target: Any) -> float | None:
     """Time at which a target begins to come back to its start [s], None where it does not."""
-    if isinstance(target, targets.OutAndBack | targets.Swing):
+    if isinstance(target, targets.OutAndBackEntry | targets.SwingEntry):
         return target.start_time + target.out_duration + target.hold_duration
     return None
 
 
-def _goal(target: targets.MinimumJerk | targets.JerkLimited, space: Space) -> Array:
+def _goal(target: targets.MinimumJerkEntry | targets.JerkLimitedEntry, space: Values) -> Array:
     if target.goal is not None:
         return space.read(target.goal)
     return space.shift(space.start, target.offset)
 
 
 def _there_and_back(
-    target: targets.OutAndBack | targets.Swing, near: Array, far: Array, move: Move
+    target: targets.OutAndBackEntry | targets.SwingEntry, near: Array, far: Array, move: Move
 ) -> Chain:
     back = target.start_time + target.out_duration + target.hold_duration
     return Chain(
@@ -126,15 +126,15 @@ def _there_and_back(
     )
 
 
-def _hold(target: targets.Hold, space: Space) -> None:
+def _hold(target: targets.HoldEntry, space: Values) -> None:
     del target, space
 
 
-def _minimum_jerk(target: targets.MinimumJerk, space: Space) -> Reference:
+def _minimum_jerk(target: targets.MinimumJerkEntry, space: Values) -> Reference:
     return space.move(space.start, _goal(target, space), target.duration, target.start_time)
 
 
-def _jerk_limited(target: targets.JerkLimited, space: Space) -> Reference:
+def _jerk_limited(target: targets.JerkLimitedEntry, space: Values) -> Reference:
     return JerkLimited(
         space.start,
         _goal(target, space),
@@ -145,12 +145,12 @@ def _jerk_limited(target: targets.JerkLimited, space: Space) -> Reference:
     )
 
 
-def _out_and_back(target: targets.OutAndBack, space: Space) -> Reference:
+def _out_and_back(target: targets.OutAndBackEntry, space: Values) -> Reference:
     far = space.shift(space.start, target.offset)
     return _there_and_back(target, space.start, far, space.move)
 
 
-def _via_points(target: targets.ViaPoints, space: Space) -> Reference:
+def _via_points(target: targets.ViaPointsEntry, space: Values) -> Reference:
     if target.points:
         points = [space.read(point) for point in target.points]
     else:
@@ -158,7 +158,7 @@ def _via_points(target: targets.ViaPoints, space: Space) -> Reference:
     return ViaPoints((target.start_time, *target.times), [space.start, *points])
 
 
-def _swing(target: targets.Swing, space: Space) -> Reference:
+def _swing(target: targets.SwingEntry, space: Values) -> Reference:
     center, axis = np.asarray(target.center), np.asarray(target.axis)
 
     def move(near: Array, far: Array, duration: float, start_time: float) -> Reference:
@@ -168,7 +168,7 @@ def _swing(target: targets.Swing, space: Space) -> Reference:
     return _there_and_back(target, np.array(0.0), np.array(1.0), move)
 
 
-def _circle(target: targets.Circle, space: Space) -> Reference:
+def _circle(target: targets.CircleEntry, space: Values) -> Reference:
     def circle(center: Array) -> Circle:
         return Circle(
             center,
@@ -182,12 +182,12 @@ def _circle(target: targets.Circle, space: Space) -> Reference:
     return circle(space.start - circle(np.zeros(3)).start)
 
 
-_BUILDERS: Mapping[type, Callable[[Any, Space], Reference | None]] = {
-    targets.Hold: _hold,
-    targets.MinimumJerk: _minimum_jerk,
-    targets.JerkLimited: _jerk_limited,
-    targets.OutAndBack: _out_and_back,
-    targets.Swing: _swing,
-    targets.ViaPoints: _via_points,
-    targets.Circle: _circle,
+_BUILDERS: Mapping[type, Callable[[Any, Values], Reference | None]] = {
+    targets.HoldEntry: _hold,
+    targets.MinimumJerkEntry: _minimum_jerk,
+    targets.JerkLimitedEntry: _jerk_limited,
+    targets.OutAndBackEntry: _out_and_back,
+    targets.SwingEntry: _swing,
+    targets.ViaPointsEntry: _via_points,
+    targets.CircleEntry: _circle,
 }

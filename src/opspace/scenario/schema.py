@@ -10,7 +10,7 @@ from pydantic import Field, PrivateAttr, ValidationInfo, field_validator, model_
 from opspace.errors import ScenarioError
 from opspace.scenario.document import Document, Key, key_text
 from opspace.scenario.events import Event, ProfileName, check_events
-from opspace.scenario.fields import Checked, Entry, Quantity, problem, shown, whole
+from opspace.scenario.fields import Checked, Entry, Number, problem, shown, whole
 from opspace.scenario.targets import Configuration
 from opspace.scenario.task_entries import AnyTask
 
@@ -18,17 +18,17 @@ if TYPE_CHECKING:
     from typing_extensions import Self
 
 
-class Singularity(Entry):
+class SingularityEntry(Entry):
     """How directions that the robot is about to lose are faded out.
 
     With the scale ``relative``, eigenvalues are multiples of the mean over the robot's workspace of
     the diagonal of J M⁻¹ Jᵀ, separately for rows in m and in rad.
     """
 
-    lower: Annotated[float, Quantity("1", above=0.0)] = Field(
+    lower: Annotated[float, Number("1", above=0.0)] = Field(
         default=0.1, description="eigenvalue at and below which a direction is absent"
     )
-    upper: Annotated[float, Quantity("1", above=0.0)] = Field(
+    upper: Annotated[float, Number("1", above=0.0)] = Field(
         default=0.6, description="eigenvalue at and above which a direction is fully active"
     )
     scale: Literal["relative", "absolute"] = Field(
@@ -44,31 +44,31 @@ class Singularity(Entry):
         return self
 
 
-class JointLimits(Entry):
+class JointLimitsEntry(Entry):
     """How joints are kept within their limits."""
 
     mode: Literal["admissible", "buffer"] = Field(
         default="admissible",
         description="act on the admissible acceleration, or within a buffer on the position",
     )
-    joints: dict[str, Annotated[tuple[float, ...], Quantity("rad or m", size=2)]] = Field(
+    joints: dict[str, Annotated[tuple[float, ...], Number("rad or m", size=2)]] = Field(
         default_factory=dict, description="joint: [lower, upper] in place of the robot's own limits"
     )
-    clearance: Annotated[float, Quantity("rad or m", at_least=0.0)] = Field(
+    clearance: Annotated[float, Number("rad or m", at_least=0.0)] = Field(
         default=0.0, description="how far inside its limits every joint is kept [rad or m]"
     )
-    observer_time: Annotated[float, Quantity("s", above=0.0)] | None = Field(
+    observer_time: Annotated[float, Number("s", above=0.0)] | None = Field(
         default=None,
         description="time with which limits learn what the model does not explain [s]; null: never",
     )
-    speeds: dict[str, Annotated[float, Quantity("rad/s or m/s", above=0.0)]] | None = Field(
+    speeds: dict[str, Annotated[float, Number("rad/s or m/s", above=0.0)]] | None = Field(
         default_factory=dict,
         description="joint: largest speed in place of the robot's own limit; null limits no speed",
     )
-    buffer: Annotated[float, Quantity("rad or m", above=0.0)] = Field(
+    buffer: Annotated[float, Number("rad or m", above=0.0)] = Field(
         default=0.1, description="width of the buffer inside each limit, for mode buffer [rad or m]"
     )
-    brake_acceleration: Annotated[float, Quantity("rad/s²", above=0.0)] | None = Field(
+    brake_acceleration: Annotated[float, Number("rad/s²", above=0.0)] | None = Field(
         default=None,
         description="what a joint can brake with [rad/s²]; null derives it from the robot",
     )
@@ -83,51 +83,51 @@ class JointLimits(Entry):
         return joints
 
 
-class Push(Entry):
+class PushEntry(Entry):
     """A force on the tool for some time."""
 
-    at: Annotated[float, Quantity("s", at_least=0.0)] = Field(description="when it begins [s]")
-    duration: Annotated[float, Quantity("s", above=0.0)] = Field(
-        description="how long it lasts [s]"
-    )
-    force: Annotated[tuple[float, ...], Quantity("N", size=3)] = Field(
+    at: Annotated[float, Number("s", at_least=0.0)] = Field(description="when it begins [s]")
+    duration: Annotated[float, Number("s", above=0.0)] = Field(description="how long it lasts [s]")
+    force: Annotated[tuple[float, ...], Number("N", size=3)] = Field(
         description="force in world axes [N]"
     )
 
 
-class Plant(Entry):
+class PlantEntry(Entry):
     """What the simulated robot has and the controller does not know about."""
 
     friction: bool = Field(default=False, description="simulate the friction in the robot's file")
-    dry_friction: Annotated[float, Quantity("1", at_least=0.0, at_most=1.0)] = Field(
+    dry_friction: Annotated[float, Number("1", at_least=0.0, at_most=1.0)] = Field(
         default=0.0, description="dry friction of every joint, as a part of its torque limit"
     )
-    mass_error: Annotated[float, Quantity("1", at_least=0.0, at_most=0.9)] = Field(
+    mass_error: Annotated[float, Number("1", at_least=0.0, at_most=0.9)] = Field(
         default=0.0,
         description="every link's mass and inertia are off by up to this part, drawn from the seed",
     )
-    delay: Annotated[float, Quantity("s", at_least=0.0, at_most=0.1)] = Field(
+    delay: Annotated[float, Number("s", at_least=0.0, at_most=0.1)] = Field(
         default=0.0, description="how late a torque reaches the joints [s], in whole ticks"
     )
-    position_noise: Annotated[float, Quantity("rad or m", at_least=0.0)] = Field(
+    position_noise: Annotated[float, Number("rad or m", at_least=0.0)] = Field(
         default=0.0, description="standard deviation of measured joint positions [rad or m]"
     )
-    velocity_noise: Annotated[float, Quantity("rad/s or m/s", at_least=0.0)] = Field(
+    velocity_noise: Annotated[float, Number("rad/s or m/s", at_least=0.0)] = Field(
         default=0.0, description="standard deviation of measured joint velocities [rad/s or m/s]"
     )
-    pushes: list[Push] = Field(default_factory=list, description="forces on the tool, with times")
+    pushes: list[PushEntry] = Field(
+        default_factory=list, description="forces on the tool, with times"
+    )
     torque_limits: bool = Field(
         default=True, description="saturate the torque at the robot's limits"
     )
 
 
-class Stop(Entry):
+class StopEntry(Entry):
     """When a run is given up."""
 
-    max_joint_speed: Annotated[float, Quantity("rad/s or m/s", above=0.0)] | None = Field(
+    max_joint_speed: Annotated[float, Number("rad/s or m/s", above=0.0)] | None = Field(
         default=None, description="joint speed that ends the run [rad/s or m/s]; null is none"
     )
-    max_torque: Annotated[float, Quantity("N·m", above=0.0)] | None = Field(
+    max_torque: Annotated[float, Number("N·m", above=0.0)] | None = Field(
         default=None, description="joint torque that ends the run [N·m]; null is none"
     )
 
@@ -150,10 +150,10 @@ class Scenario(Entry):
         default="pinocchio", description="library that computes the controller's dynamics"
     )
     floating_base: bool = Field(default=False, description="free the root link")
-    duration: Annotated[float, Quantity("s", above=0.0, at_most=3600.0)] = Field(
+    duration: Annotated[float, Number("s", above=0.0, at_most=3600.0)] = Field(
         description="simulated time [s]"
     )
-    dt: Annotated[float, Quantity("s", above=0.0, at_most=0.1)] = Field(
+    dt: Annotated[float, Number("s", above=0.0, at_most=0.1)] = Field(
         default=0.001, description="control tick [s]"
     )
     seed: Annotated[int, Checked(whole)] = Field(
@@ -185,14 +185,14 @@ class Scenario(Entry):
     events: list[Event] = Field(
         default_factory=list, description="changes of the stack while the robot moves, with times"
     )
-    joint_limits: JointLimits | None = Field(
-        default_factory=JointLimits, description="joint limit avoidance; null is none"
+    joint_limits: JointLimitsEntry | None = Field(
+        default_factory=JointLimitsEntry, description="joint limit avoidance; null is none"
     )
-    singularity: Singularity | None = Field(
-        default_factory=Singularity, description="singularity avoidance; null is none"
+    singularity: SingularityEntry | None = Field(
+        default_factory=SingularityEntry, description="singularity avoidance; null is none"
     )
-    plant: Plant = Field(default_factory=Plant, description="the simulated robot")
-    stop: Stop = Field(default_factory=Stop, description="when a run is given up")
+    plant: PlantEntry = Field(default_factory=PlantEntry, description="the simulated robot")
+    stop: StopEntry = Field(default_factory=StopEntry, description="when a run is given up")
 
     @field_validator("robot")
     @classmethod

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Generic, Literal, TypeVar
 
 from pydantic import Discriminator, Field, Tag, model_validator
 
-from opspace.scenario.fields import Checked, Entry, Quantity, problem, shown
+from opspace.scenario.fields import Checked, Entry, Number, problem, shown
 
 if TYPE_CHECKING:
     from typing_extensions import Self
@@ -21,25 +21,25 @@ OffsetT = TypeVar("OffsetT")
 
 _OR_REFERENCE = ", or a mapping with a type"
 
-Seconds = Annotated[float, Quantity("s", at_least=0.0)]
-Duration = Annotated[float, Quantity("s", above=0.0)]
-Point = Annotated[tuple[float, ...], Quantity("m", size=3)]
-RotationVector = Annotated[tuple[float, ...], Quantity("rad", size=3)]
-Joints = Annotated[tuple[float, ...], Quantity("rad or m", size="any")]
-Joint = Annotated[float, Quantity("rad or m")]
+Seconds = Annotated[float, Number("s", at_least=0.0)]
+Duration = Annotated[float, Number("s", above=0.0)]
+Point = Annotated[tuple[float, ...], Number("m", size=3)]
+RotationVector = Annotated[tuple[float, ...], Number("rad", size=3)]
+Joints = Annotated[tuple[float, ...], Number("rad or m", size="any")]
+Joint = Annotated[float, Number("rad or m")]
 
-PointValue = Annotated[tuple[float, ...], Quantity("m", size=3, otherwise=_OR_REFERENCE)]
-JointValue = Annotated[float, Quantity("rad or m", otherwise=_OR_REFERENCE)]
+PointValue = Annotated[tuple[float, ...], Number("m", size=3, otherwise=_OR_REFERENCE)]
+JointValue = Annotated[float, Number("rad or m", otherwise=_OR_REFERENCE)]
 PoseValue = Annotated[
     tuple[float, ...],
-    Quantity(
+    Number(
         "x y z, quaternion w x y z", size=7, otherwise=", or a mapping of position and orientation"
     ),
 ]
 
 
 def _check_quaternion(value: Any) -> tuple[float, ...]:
-    numbers = Quantity("quaternion w x y z", size=4, otherwise=_OR_REFERENCE).check(value)
+    numbers = Number("quaternion w x y z", size=4, otherwise=_OR_REFERENCE).check(value)
     assert isinstance(numbers, tuple)
     norm = sum(number**2 for number in numbers) ** 0.5
     if abs(norm - 1.0) > QUATERNION_TOLERANCE:
@@ -57,7 +57,7 @@ def _check_configuration(value: Any) -> str | tuple[float, ...]:
     if isinstance(value, str) and value.strip():
         return value
     names = ", or the name of one of the robot's configurations such as reference"
-    numbers = Quantity("rad or m", size="any", otherwise=names).check(value)
+    numbers = Number("rad or m", size="any", otherwise=names).check(value)
     assert isinstance(numbers, tuple)
     return numbers
 
@@ -66,7 +66,7 @@ Configuration = Annotated[str | tuple[float, ...], Checked(_check_configuration)
 """Joint values, or the name of a configuration of the robot."""
 
 
-class Hold(Entry):
+class HoldEntry(Entry):
     """Stay where the task finds the robot."""
 
     type: Literal["hold"] = Field(description="hold")
@@ -88,29 +88,29 @@ class _Aimed(Entry, Generic[GoalT, OffsetT]):
         return self
 
 
-class MinimumJerk(_Aimed[GoalT, OffsetT], Generic[GoalT, OffsetT]):
+class MinimumJerkEntry(_Aimed[GoalT, OffsetT], Generic[GoalT, OffsetT]):
     """Straight from rest to rest with the least jerk."""
 
     type: Literal["minimum_jerk"] = Field(description="minimum_jerk")
     duration: Duration = Field(description="time of the motion [s]")
 
 
-class JerkLimited(_Aimed[GoalT, OffsetT], Generic[GoalT, OffsetT]):
+class JerkLimitedEntry(_Aimed[GoalT, OffsetT], Generic[GoalT, OffsetT]):
     """As fast as limits of velocity, acceleration and jerk allow."""
 
     type: Literal["jerk_limited"] = Field(description="jerk_limited")
-    max_velocity: Annotated[float, Quantity("m/s or rad/s", above=0.0)] = Field(
+    max_velocity: Annotated[float, Number("m/s or rad/s", above=0.0)] = Field(
         description="limit of each coordinate [m/s or rad/s]"
     )
-    max_acceleration: Annotated[float, Quantity("m/s² or rad/s²", above=0.0)] = Field(
+    max_acceleration: Annotated[float, Number("m/s² or rad/s²", above=0.0)] = Field(
         description="limit of each coordinate [m/s² or rad/s²]"
     )
-    max_jerk: Annotated[float, Quantity("m/s³ or rad/s³", above=0.0)] = Field(
+    max_jerk: Annotated[float, Number("m/s³ or rad/s³", above=0.0)] = Field(
         description="limit of each coordinate [m/s³ or rad/s³]"
     )
 
 
-class OutAndBack(Entry, Generic[OffsetT]):
+class OutAndBackEntry(Entry, Generic[OffsetT]):
     """Out by an offset, wait, and back to the start, each way with the least jerk."""
 
     type: Literal["out_and_back"] = Field(description="out_and_back")
@@ -121,15 +121,15 @@ class OutAndBack(Entry, Generic[OffsetT]):
     start_time: Seconds = Field(default=0.0, description="time at which it begins [s]")
 
 
-class Swing(Entry):
+class SwingEntry(Entry):
     """Out on an arc about an axis, wait, and back to the start, each way with the least jerk."""
 
     type: Literal["swing"] = Field(description="swing")
-    angle: Annotated[float, Quantity("rad")] = Field(
+    angle: Annotated[float, Number("rad")] = Field(
         description="angle of the arc [rad], counter-clockwise about the axis"
     )
     center: Point = Field(description="a point on the axis [m]")
-    axis: Annotated[tuple[float, ...], Quantity("1", size=3)] = Field(
+    axis: Annotated[tuple[float, ...], Number("1", size=3)] = Field(
         default=(0.0, 0.0, 1.0), description="direction of the axis"
     )
     out_duration: Duration = Field(description="time of the way out [s]")
@@ -144,11 +144,11 @@ class Swing(Entry):
         return self
 
 
-class ViaPoints(Entry, Generic[GoalT, OffsetT]):
+class ViaPointsEntry(Entry, Generic[GoalT, OffsetT]):
     """From the start through points at given times, at rest at both ends."""
 
     type: Literal["via_points"] = Field(description="via_points")
-    times: Annotated[tuple[float, ...], Quantity("s", above=0.0, size="any")] = Field(
+    times: Annotated[tuple[float, ...], Number("s", above=0.0, size="any")] = Field(
         description="rising times of the points [s]"
     )
     points: Annotated[list[GoalT] | None, Field(min_length=1)] = Field(
@@ -172,13 +172,13 @@ class ViaPoints(Entry, Generic[GoalT, OffsetT]):
         return self
 
 
-class Circle(Entry):
+class CircleEntry(Entry):
     """On a circle that passes through the start, from rest up to one turn per period."""
 
     type: Literal["circle"] = Field(description="circle")
-    radius: Annotated[float, Quantity("m", above=0.0)] = Field(description="radius [m]")
+    radius: Annotated[float, Number("m", above=0.0)] = Field(description="radius [m]")
     period: Duration = Field(description="time of one turn at full speed [s]")
-    normal: Annotated[tuple[float, ...], Quantity("1", size=3)] = Field(
+    normal: Annotated[tuple[float, ...], Number("1", size=3)] = Field(
         default=(0.0, 0.0, 1.0), description="axis of the circle, counter-clockwise"
     )
     start_time: Seconds = Field(default=0.0, description="time at which it begins [s]")
@@ -207,41 +207,41 @@ _BY_TYPE = Discriminator(tag_of)
 
 PointTarget = Annotated[
     Annotated[PointValue, Tag("<value>")]
-    | Annotated[Hold, Tag("<hold>")]
-    | Annotated[MinimumJerk[Point, Point], Tag("<minimum_jerk>")]
-    | Annotated[JerkLimited[Point, Point], Tag("<jerk_limited>")]
-    | Annotated[OutAndBack[Point], Tag("<out_and_back>")]
-    | Annotated[ViaPoints[Point, Point], Tag("<via_points>")]
-    | Annotated[Circle, Tag("<circle>")]
-    | Annotated[Swing, Tag("<swing>")],
+    | Annotated[HoldEntry, Tag("<hold>")]
+    | Annotated[MinimumJerkEntry[Point, Point], Tag("<minimum_jerk>")]
+    | Annotated[JerkLimitedEntry[Point, Point], Tag("<jerk_limited>")]
+    | Annotated[OutAndBackEntry[Point], Tag("<out_and_back>")]
+    | Annotated[ViaPointsEntry[Point, Point], Tag("<via_points>")]
+    | Annotated[CircleEntry, Tag("<circle>")]
+    | Annotated[SwingEntry, Tag("<swing>")],
     _BY_TYPE,
 ]
 
 OrientationTarget = Annotated[
     Annotated[Quaternion, Tag("<value>")]
-    | Annotated[Hold, Tag("<hold>")]
-    | Annotated[MinimumJerk[Quaternion, RotationVector], Tag("<minimum_jerk>")]
-    | Annotated[OutAndBack[RotationVector], Tag("<out_and_back>")],
+    | Annotated[HoldEntry, Tag("<hold>")]
+    | Annotated[MinimumJerkEntry[Quaternion, RotationVector], Tag("<minimum_jerk>")]
+    | Annotated[OutAndBackEntry[RotationVector], Tag("<out_and_back>")],
     _BY_TYPE,
 ]
 
 PostureTarget = Annotated[
     Annotated[Configuration, Tag("<value>")]
-    | Annotated[Hold, Tag("<hold>")]
-    | Annotated[MinimumJerk[Configuration, Joints], Tag("<minimum_jerk>")]
-    | Annotated[JerkLimited[Configuration, Joints], Tag("<jerk_limited>")]
-    | Annotated[OutAndBack[Joints], Tag("<out_and_back>")]
-    | Annotated[ViaPoints[Configuration, Joints], Tag("<via_points>")],
+    | Annotated[HoldEntry, Tag("<hold>")]
+    | Annotated[MinimumJerkEntry[Configuration, Joints], Tag("<minimum_jerk>")]
+    | Annotated[JerkLimitedEntry[Configuration, Joints], Tag("<jerk_limited>")]
+    | Annotated[OutAndBackEntry[Joints], Tag("<out_and_back>")]
+    | Annotated[ViaPointsEntry[Configuration, Joints], Tag("<via_points>")],
     _BY_TYPE,
 ]
 
 JointTarget = Annotated[
     Annotated[JointValue, Tag("<value>")]
-    | Annotated[Hold, Tag("<hold>")]
-    | Annotated[MinimumJerk[Joint, Joint], Tag("<minimum_jerk>")]
-    | Annotated[JerkLimited[Joint, Joint], Tag("<jerk_limited>")]
-    | Annotated[OutAndBack[Joint], Tag("<out_and_back>")]
-    | Annotated[ViaPoints[Joint, Joint], Tag("<via_points>")],
+    | Annotated[HoldEntry, Tag("<hold>")]
+    | Annotated[MinimumJerkEntry[Joint, Joint], Tag("<minimum_jerk>")]
+    | Annotated[JerkLimitedEntry[Joint, Joint], Tag("<jerk_limited>")]
+    | Annotated[OutAndBackEntry[Joint], Tag("<out_and_back>")]
+    | Annotated[ViaPointsEntry[Joint, Joint], Tag("<via_points>")],
     _BY_TYPE,
 ]
 

@@ -1,12 +1,24 @@
-"""What a scenario can say about a task; keys and defaults are those of the task's constructor."""
+"""What a scenario can say about a task, made from the signature of the task's constructor."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Literal
+import inspect
+import re
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import (
+    TYPE_CHECKING,
+    Annotated,
+    Any,
+    Literal,
+    NamedTuple,
+    Union,
+    get_type_hints,
+)
 
-from pydantic import Discriminator, Field, Tag, field_validator, model_validator
+from pydantic import AfterValidator, Discriminator, Field, Tag, create_model, model_validator
 
-from opspace.scenario.fields import Checked, Entry, Quantity, problem, shown, whole
+from opspace.scenario.fields import Checked, Entry, Number, problem, shown, whole
 from opspace.scenario.targets import (
     JointTarget,
     OrientationTarget,
@@ -16,21 +28,22 @@ from opspace.scenario.targets import (
     PostureTarget,
     tag_of,
 )
+from opspace.tasks import TASK_KINDS
+from opspace.tasks.kinds import TaskKind
 
 if TYPE_CHECKING:
     from typing_extensions import Self
 
 Gain = float | tuple[float, ...]
-Stiffness = Annotated[Gain, Quantity("1/s²", at_least=0.0, size="rows")]
-Damping = Annotated[Gain, Quantity("1/s", at_least=0.0, size="rows")]
-LinearSpeed = Annotated[float, Quantity("m/s", above=0.0)]
-AngularSpeed = Annotated[float, Quantity("rad/s", above=0.0)]
-JointSpeed = Annotated[float, Quantity("rad/s or m/s", above=0.0)]
-PoseSpeeds = Annotated[tuple[float, ...], Quantity("linear m/s, angular rad/s", above=0.0, size=2)]
-AxesFrame = Literal["world", "tool"]
+Stiffness = Annotated[Gain, Number("1/s²", at_least=0.0, size="rows")]
+Damping = Annotated[Gain, Number("1/s", at_least=0.0, size="rows")]
+BlockStiffness = Annotated[float, Number("1/s²", at_least=0.0)]
+LinearSpeed = Annotated[float, Number("m/s", above=0.0)]
+AngularSpeed = Annotated[float, Number("rad/s", above=0.0)]
+JointSpeed = Annotated[float, Number("rad/s or m/s", above=0.0)]
+PoseSpeeds = Annotated[tuple[float, ...], Number("linear m/s, angular rad/s", above=0.0, size=2)]
 
 _TARGET = "value or reference to follow; null holds the value at the start"
-_FRAME = "name of the frame; null is the robot's tool"
 
 
 class TaskEntry(Entry):
@@ -45,10 +58,22 @@ class TaskEntry(Entry):
     kv: Damping | None = Field(
         default=None, description="damping [1/s]; null is critical, 2 sqrt(kp)"
     )
+    if TYPE_CHECKING:  # every kind has its own
+        type: str
+        target: Any
 
     def rows(self) -> int | None:
         """Number of task rows, None where only the robot knows it."""
-        return None
+        match TASK_KINDS[self.type].controls:
+            case "pose":
+                return 6
+            case "joint":
+                return 1
+            case "joints":
+                joints = getattr(self, "joints", None)
+                return None if joints is None else len(joints)
+            case _:
+                return len(getattr(self, "axes", "xyz"))
 
     @model_validator(mode="after")
     def _check_rows(self) -> Self:
@@ -59,164 +84,109 @@ class TaskEntry(Entry):
         return self
 
 
-class _AxesEntry(TaskEntry):
-    """A task on some of three axes."""
-
-    axes: str = Field(default="xyz", description="axes to control, some of the letters xyz")
-
-    @field_validator("axes")
-    @classmethod
-    def _check_axes(cls, axes: str) -> str:
-        if not axes or set(axes) - set("xyz") or len(set(axes)) < len(axes):
-            raise problem(f"must be some of the letters xyz, each once, not {shown(axes)}")
-        return axes
-
-    def rows(self) -> int:
-        """Number of task rows."""
-        return len(self.axes)
+def _check_axes(axes: str) -> str:
+    if not axes or set(axes) - set("xyz") or len(set(axes)) < len(axes):
+        raise problem(f"must be some of the letters xyz, each once, not {shown(axes)}")
+    return axes
 
 
-class _SixRowEntry(TaskEntry):
-    """A task on position and orientation together."""
+class _Argument(NamedTuple):
+    """An argument of a constructor as a key: what it takes, and what it means."""
 
-    target: PoseTarget | None = Field(default=None, description=_TARGET)
-    kp_linear: Annotated[float, Quantity("1/s²", at_least=0.0)] | None = Field(
-        default=None, description="stiffness of the linear rows in place of kp [1/s²]"
+    takes: Any
+    means: str
+
+
+def _nullable(takes: Any) -> Any:
+    return takes | None
+
+
+_ARGUMENTS: Mapping[str, _Argument] = {
+    "axes": _Argument(
+        Annotated[str, AfterValidator(_check_axes)], "axes to control, some of the letters xyz"
+    ),
+    "frame": _Argument(_nullable(str), "name of the frame; null is the robot's tool"),
+    "reference_frame": _Argument(str, "name of the frame it is seen from"),
+    "joint": _Argument(str, "name of the joint"),
+    "joints": _Argument(
+        Annotated[list[str] | None, Field(min_length=1)],
+        "names of the joints; null is every actuated joint",
+    ),
+    "kp_linear": _Argument(
+        _nullable(BlockStiffness), "stiffness of the linear rows in place of kp [1/s²]"
+    ),
+    "kp_angular": _Argument(
+        _nullable(BlockStiffness), "stiffness of the angular rows in place of kp [1/s²]"
+    ),
+    "axes_frame": _Argument(Literal["world", "tool"], "whose axes: world or tool"),
+    "offset": _Argument(_nullable(Point), "point to control, in the frame's axes [m]"),
+}
+"""Arguments that mean the same in every task; others are read by their type."""
+
+_SPEED = "speed that the error may ask for"
+_CONTROLLED: Mapping[str, Mapping[str, _Argument]] = {
+    controls: {
+        "target": _Argument(_nullable(target), _TARGET),
+        "max_speed": _Argument(_nullable(speed), f"{words}; null is no limit"),
+    }
+    for controls, target, speed, words in (
+        ("position", PointTarget, LinearSpeed, f"{_SPEED} [m/s]"),
+        ("orientation", OrientationTarget, AngularSpeed, f"{_SPEED} [rad/s]"),
+        ("pose", PoseTarget, PoseSpeeds, "speeds that the error may ask for [m/s, rad/s]"),
+        ("joint", JointTarget, JointSpeed, f"{_SPEED} [rad/s or m/s]"),
+        ("joints", PostureTarget, JointSpeed, f"norm of the {_SPEED} [rad/s]"),
     )
-    kp_angular: Annotated[float, Quantity("1/s²", at_least=0.0)] | None = Field(
-        default=None, description="stiffness of the angular rows in place of kp [1/s²]"
-    )
-    max_speed: PoseSpeeds | None = Field(
-        default=None, description="speeds that the error may ask for [m/s, rad/s]; null is no limit"
-    )
-    frame: str | None = Field(default=None, description=_FRAME)
-
-    def rows(self) -> int:
-        """Number of task rows."""
-        return 6
+}
+_ALWAYS = ("self", "name", *TaskEntry.model_fields)
+_PLAIN: Mapping[Any, Any] = {float: Annotated[float, Number("1")], bool: bool, str: str}
 
 
-class Position(_AxesEntry):
-    """Position of a point of a frame."""
+def make_entry(name: str, kind: TaskKind) -> type[TaskEntry]:
+    """Make the entry of a kind of task.
 
-    type: Literal["position"] = Field(description="position")
-    frame: str | None = Field(default=None, description=_FRAME)
-    target: PointTarget | None = Field(default=None, description=_TARGET)
-    axes_frame: AxesFrame = Field(default="world", description="whose axes: world or tool")
-    max_speed: LinearSpeed | None = Field(
-        default=None, description="speed that the error may ask for [m/s]; null is no limit"
-    )
-    offset: Point | None = Field(
-        default=None, description="point to control, in the frame's axes [m]"
-    )
+    Args:
+        name: What a scenario calls it.
+        kind: The task.
 
-
-class Orientation(_AxesEntry):
-    """Orientation of a frame."""
-
-    type: Literal["orientation"] = Field(description="orientation")
-    frame: str | None = Field(default=None, description=_FRAME)
-    target: OrientationTarget | None = Field(default=None, description=_TARGET)
-    axes_frame: AxesFrame = Field(default="world", description="whose axes: world or tool")
-    max_speed: AngularSpeed | None = Field(
-        default=None, description="speed that the error may ask for [rad/s]; null is no limit"
-    )
+    Returns:
+        The entry; its keys and defaults are those of the constructor, and ``type``, ``level`` and
+        ``present``.
+    """
+    known = {**_ARGUMENTS, **_CONTROLLED[kind.controls]}
+    fields: dict[str, Any] = {"type": (Literal[name], Field(description=name))}
+    for key, argument in inspect.signature(kind.task).parameters.items():
+        if key in _ALWAYS:
+            continue
+        takes, means = known.get(key) or _by_type(kind, key)
+        default = argument.default
+        if default is argument.empty:  # only what may be null may be left out
+            default = None if key == "frame" else ...
+        fields[key] = (takes, Field(default=default, description=means))
+    camel = name.title().replace("_", "")
+    return create_model(f"{camel}Entry", __base__=TaskEntry, __module__=__name__, **fields)
 
 
-class Pose(_SixRowEntry):
-    """Position and orientation of a frame."""
-
-    type: Literal["pose"] = Field(description="pose")
-    axes_frame: AxesFrame = Field(default="world", description="whose axes: world or tool")
-    offset: Point | None = Field(
-        default=None, description="point to control, in the frame's axes [m]"
-    )
-
-
-class Posture(TaskEntry):
-    """Several joints."""
-
-    type: Literal["posture"] = Field(description="posture")
-    target: PostureTarget | None = Field(default=None, description=_TARGET)
-    joints: Annotated[list[str] | None, Field(min_length=1)] = Field(
-        default=None, description="names of the joints; null is every actuated joint"
-    )
-    max_speed: JointSpeed | None = Field(
-        default=None,
-        description="norm of the speed that the error may ask for [rad/s]; null is no limit",
-    )
-
-    def rows(self) -> int | None:
-        """Number of task rows, None for every actuated joint."""
-        return len(self.joints) if self.joints is not None else None
+def _by_type(kind: TaskKind, key: str) -> _Argument:
+    """Read an argument by its annotation, and what it means in the docstring of its task."""
+    hint = get_type_hints(kind.task.__init__)[key]
+    choices = getattr(hint, "__args__", (hint,))
+    takes: Any = next((_PLAIN[one] for one in choices if one in _PLAIN), None)
+    if takes is None:
+        takes = Annotated[tuple[float, ...], Number("1", size="any")]
+    found = re.search(rf"^ *{key}: (.+?)\.?$", kind.task.__doc__ or "", re.MULTILINE)
+    means = found[1] if found else key
+    return _Argument(_nullable(takes) if type(None) in choices else takes, means)
 
 
-class Joint(TaskEntry):
-    """One joint."""
+ENTRIES: Mapping[str, type[TaskEntry]] = MappingProxyType(
+    {name: make_entry(name, kind) for name, kind in TASK_KINDS.items()}
+)
+"""The entry of every kind of task, by what a scenario calls it."""
 
-    type: Literal["joint"] = Field(description="joint")
-    joint: str = Field(description="name of the joint")
-    target: JointTarget | None = Field(default=None, description=_TARGET)
-    max_speed: JointSpeed | None = Field(
-        default=None,
-        description="speed that the error may ask for [rad/s or m/s]; null is no limit",
-    )
-
-    def rows(self) -> int:
-        """Number of task rows."""
-        return 1
-
-
-class Com(_AxesEntry):
-    """Position of the centre of mass."""
-
-    type: Literal["com"] = Field(description="com")
-    target: PointTarget | None = Field(default=None, description=_TARGET)
-    max_speed: LinearSpeed | None = Field(
-        default=None, description="speed that the error may ask for [m/s]; null is no limit"
-    )
-
-
-class RelativePosition(_AxesEntry):
-    """Position of a frame as another frame sees it."""
-
-    type: Literal["relative_position"] = Field(description="relative_position")
-    frame: str | None = Field(default=None, description=_FRAME)
-    reference_frame: str = Field(description="name of the frame it is seen from")
-    target: PointTarget | None = Field(default=None, description=_TARGET)
-    max_speed: LinearSpeed | None = Field(
-        default=None, description="speed that the error may ask for [m/s]; null is no limit"
-    )
-
-
-class RelativeOrientation(_AxesEntry):
-    """Orientation of a frame as another frame sees it."""
-
-    type: Literal["relative_orientation"] = Field(description="relative_orientation")
-    frame: str | None = Field(default=None, description=_FRAME)
-    reference_frame: str = Field(description="name of the frame it is seen from")
-    target: OrientationTarget | None = Field(default=None, description=_TARGET)
-    max_speed: AngularSpeed | None = Field(
-        default=None, description="speed that the error may ask for [rad/s]; null is no limit"
-    )
-
-
-class RelativePose(_SixRowEntry):
-    """Pose of a frame as another frame sees it."""
-
-    type: Literal["relative_pose"] = Field(description="relative_pose")
-    reference_frame: str = Field(description="name of the frame it is seen from")
-
-
-AnyTask = Annotated[
-    Annotated[Position, Tag("<position>")]
-    | Annotated[Orientation, Tag("<orientation>")]
-    | Annotated[Pose, Tag("<pose>")]
-    | Annotated[Posture, Tag("<posture>")]
-    | Annotated[Joint, Tag("<joint>")]
-    | Annotated[Com, Tag("<com>")]
-    | Annotated[RelativePosition, Tag("<relative_position>")]
-    | Annotated[RelativeOrientation, Tag("<relative_orientation>")]
-    | Annotated[RelativePose, Tag("<relative_pose>")],
-    Discriminator(tag_of),
-]
+if TYPE_CHECKING:
+    AnyTask = TaskEntry
+else:
+    AnyTask = Annotated[
+        Union[tuple(Annotated[entry, Tag(f"<{name}>")] for name, entry in ENTRIES.items())],  # noqa: UP007
+        Discriminator(tag_of),
+    ]

@@ -99,6 +99,13 @@ class MujocoPlant:
         mujoco.mj_forward(self.model, self.data)
         self.dt = dt
 
+    def __repr__(self) -> str:
+        fastest = float(np.max(np.abs(self.v), initial=0.0))
+        return (
+            f"MujocoPlant({self._robot.name!r}, t={self.t:g} s, dt={self.dt:g} s, "
+            f"fastest joint {fastest:.3g} rad/s)"
+        )
+
     @property
     def t(self) -> float:
         """Simulated time, s."""

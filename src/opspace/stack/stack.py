@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 
-from opspace.errors import InputError
+from opspace.errors import InputError, unknown_name
 from opspace.stack.changes import (
     Insert,
     Move,
@@ -36,7 +36,7 @@ class Stack:
     or retimed on its way: what is asked last holds, and nothing steps. A transition on its way
     that gets a new goal keeps its profile.
 
-    A stack belongs to one controller.
+    A stack belongs to one controller. ``stack["name"]`` is the task of that name.
 
     Args:
         levels: Tasks, lists of tasks, and at most one `JointLimits`; or a mapping from the number
@@ -73,6 +73,41 @@ class Stack:
     def __iter__(self) -> Iterator[Task]:
         """Iterate over the tasks, most important first."""
         return (task for level in self.levels for task in level)
+
+    def __len__(self) -> int:
+        """Count the tasks; those that are leaving are still among them."""
+        return len(list(iter(self)))
+
+    def __contains__(self, task: object) -> bool:
+        """Tell whether a task, or one of this name, is among them."""
+        return any(task is one or task == one.name for one in self)
+
+    def __getitem__(self, name: str) -> Task:
+        """Return the task of a name.
+
+        Raises:
+            UnknownNameError: There is none.
+        """
+        named = {task.name: task for task in self}
+        if name not in named:
+            raise unknown_name("task in the stack", str(name), named)
+        return named[name]
+
+    def __repr__(self) -> str:
+        when = "" if self.time is None else f" at t = {self.time:g} s"
+        lines = [f"Stack of {len(self.members)} tasks{when}"]
+        if self.limits is not None:
+            lines.append(f"  above all: {self.limits!r}")
+        for number in sorted({member.level for member in self.members}):
+            there = (self._told(member) for member in self.members if member.level == number)
+            lines.append(f"  level {number:g}: {', '.join(there)}")
+        return "\n".join(lines)
+
+    def _told(self, member: Member) -> str:
+        presence = 1.0 if self.time is None else member.presence.value(self.time)
+        return (
+            member.task.name if presence == 1.0 else f"{member.task.name} ({presence:.2g} present)"
+        )
 
     @property
     def levels(self) -> tuple[tuple[Task, ...], ...]:

@@ -24,7 +24,7 @@ UNITS = {
 _ROUNDING = 1e-9
 
 
-class Watch:
+class LimitWatch:
     """The observer of a run that keeps numbers instead of columns.
 
     ``position_excess`` is how far any joint went beyond a limit that could be respected: one that it

@@ -10,7 +10,7 @@ from opspace.errors import OpspaceError
 from opspace.loop import simulate
 from opspace.scenario.build import build
 from opspace.scenario.load import to_dict
-from opspace.sweep.limit_measures import Watch
+from opspace.sweep.limit_measures import LimitWatch
 from opspace.sweep.sweep_plan import SweepPlan, run_id
 
 ENDS = ("completed", "stopped", "refused", "crashed", "died", "timed out")
@@ -34,7 +34,7 @@ def run_row(plan: SweepPlan, index: int) -> dict[str, Any]:
         scenario = plan.scenario(index)
         row["id"], row["scenario"] = run_id(scenario), to_dict(scenario)
         built = build(scenario)
-        watch = Watch(built)
+        watch = LimitWatch(built)
         outcome = simulate(built.plant, built.controller, scenario.duration, [watch], built.stop)
     except OpspaceError as error:
         return {**row, "ended": "refused", "reason": str(error)}

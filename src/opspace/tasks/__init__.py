@@ -1,11 +1,14 @@
 """What a robot can be asked for, and how the wish moves in time."""
 
+from types import MappingProxyType
+
 from opspace.tasks.activations import ActivationProduct as ActivationProduct
 from opspace.tasks.activations import DistanceBuffer as DistanceBuffer
 from opspace.tasks.activations import JointBuffer as JointBuffer
 from opspace.tasks.com import ComTask as ComTask
 from opspace.tasks.joint import JointTask as JointTask
 from opspace.tasks.joint_limits import JointLimits as JointLimits
+from opspace.tasks.kinds import TaskKind
 from opspace.tasks.orientation import OrientationTask as OrientationTask
 from opspace.tasks.pose import PoseTask as PoseTask
 from opspace.tasks.position import PositionTask as PositionTask
@@ -27,3 +30,18 @@ from opspace.tasks.relative import RelativePositionTask as RelativePositionTask
 from opspace.tasks.task import Task as Task
 from opspace.tasks.task import TaskTerms as TaskTerms
 from opspace.tasks.tracking import TrackingTask as TrackingTask
+
+TASK_KINDS = MappingProxyType(
+    {
+        "position": TaskKind(PositionTask, "position"),
+        "orientation": TaskKind(OrientationTask, "orientation"),
+        "pose": TaskKind(PoseTask, "pose"),
+        "posture": TaskKind(PostureTask, "joints"),
+        "joint": TaskKind(JointTask, "joint"),
+        "com": TaskKind(ComTask, "position"),
+        "relative_position": TaskKind(RelativePositionTask, "position"),
+        "relative_orientation": TaskKind(RelativeOrientationTask, "orientation"),
+        "relative_pose": TaskKind(RelativePoseTask, "pose"),
+    }
+)
+"""Every task that ticks compute from numbers, under the name that scenarios give it."""

@@ -13,6 +13,7 @@ import numpy as np
 from opspace.errors import InputError, unknown_name
 from opspace.law import PROFILES
 from opspace.law.scalars import LIMIT_LAWS, allowed_speed
+from opspace.tasks.known_attributes import KnownAttributes
 from opspace.tasks.validation import Array
 
 if TYPE_CHECKING:
@@ -48,7 +49,7 @@ class Side:
         return f"{self.joint}/{'upper' if self.sign > 0 else 'lower'}"
 
 
-class JointLimits:
+class JointLimits(KnownAttributes):
     r"""Keep joints inside their limits by task sets at the highest priority.
 
     With d the distance to the limit, v the joint's speed towards it and a the braking acceleration,
@@ -135,6 +136,12 @@ class JointLimits:
         self._limits_speed = speeds is not None and LIMIT_LAWS[mode].bound
         self._speeds = {name: _speed(name, speed) for name, speed in (speeds or {}).items()}
         self.sides: tuple[Side, ...] = ()
+
+    def __repr__(self) -> str:
+        width = (
+            f"buffer={self.buffer:g}" if self.mode == "buffer" else f"clearance={self.clearance:g}"
+        )
+        return f"{type(self).__name__}(mode={self.mode!r}, {width}, {len(self.sides)} sides)"
 
     def bind(self, robot: Robot, brake: Array) -> None:
         """Find the limited joints of a robot.

@@ -80,7 +80,7 @@ class MotionTask(TrackingTask):
         self._require_bound(robot)
         quantity, block = self.quantity, self.quantity.block
         motion = self.source.measure(robot)
-        desired = self._desired(t, lambda: quantity.value(motion))
+        desired = self.desired(robot, t)
         error = quantity.error(motion, desired.x)
         basis, drift = self.selection, motion.drift[block]
         if self.in_tool_axes:

@@ -68,7 +68,7 @@ class PostureTask(TrackingTask):
         layout = self.layout
         assert layout is not None  # bound
         q = robot.q
-        desired = self._desired(t, lambda: q[layout.entries])
+        desired = self.desired(robot, t)
         q_desired = q.copy()
         q_desired[layout.entries] = desired.x
         error = robot.difference(q, q_desired)[layout.coordinates]

@@ -11,7 +11,8 @@ from numpy.typing import ArrayLike
 
 from opspace.errors import InputError
 from opspace.tasks.gains import make_gains
-from opspace.tasks.validation import Array
+from opspace.tasks.known_attributes import KnownAttributes
+from opspace.tasks.validation import Array, brief
 
 if TYPE_CHECKING:
     from opspace.robots.protocol import Robot
@@ -45,11 +46,12 @@ CHANGES = LastChange()
 """Of all tasks there are: most ticks find that nothing has changed, and look at no task."""
 
 
-class Task(ABC):
+class Task(KnownAttributes, ABC):
     """Base class of all tasks.
 
     A task of one's own needs ``bind`` (look up names, set ``rows`` and ``units``) and
-    ``evaluate``. ``rows`` is 0 as long as it is not known.
+    ``evaluate``. ``rows`` is 0 as long as it is not known. Attributes of one's own are made in its
+    own methods, or declared in the class; elsewhere a name that it does not have is refused.
 
     Attributes:
         name: Name of the task, unique within a stack.
@@ -85,7 +87,7 @@ class Task(ABC):
     if not TYPE_CHECKING:  # a type checker would take any name for an attribute
 
         def __setattr__(self, name: str, value: object) -> None:
-            """Set an attribute, then say so: a tick in between looks at the task once more."""
+            """Set a known attribute, then say so: a tick in between looks at the task once more."""
             super().__setattr__(name, value)
             CHANGES.last = object()
 
@@ -116,7 +118,7 @@ class Task(ABC):
             InputError: Not bound to this robot, or a reference that gave unusable numbers.
         """
 
-    def reset(self) -> None:  # noqa: B027 - most tasks remember nothing
+    def reset(self) -> None:
         """Forget what was remembered from earlier ticks, such as a held start value."""
 
     def row_axes(self, robot: Robot) -> Array | None:
@@ -170,7 +172,15 @@ class Task(ABC):
         )
 
     def __repr__(self) -> str:
-        return f"{type(self).__name__}(name={self.name!r}, rows={self.rows})"
+        gains = self._gains
+        words = [repr(self.name), *self._words(), f"kp={brief(gains.kp)}, kv={brief(gains.kv)}"]
+        if gains.max_speed is not None:
+            words.append(f"max_speed={brief(gains.max_speed)}")
+        return f"{type(self).__name__}({', '.join(words)})"
+
+    def _words(self) -> list[str]:
+        """Say what ``repr`` tells between name and gains."""
+        return [f"rows={self.rows}"]
 
 
 def _plain(gain: Array) -> float | Array:

@@ -12,8 +12,9 @@ from numpy.typing import ArrayLike
 
 from opspace.errors import InputError, UnknownNameError
 from opspace.tasks.references.sample import Reference, Sample
+from opspace.tasks.rotation import quaternion_from_matrix
 from opspace.tasks.task import Task, TaskTerms
-from opspace.tasks.validation import Array, finite_array, shown
+from opspace.tasks.validation import Array, brief, finite_array, shown
 
 if TYPE_CHECKING:
     from opspace.robots.protocol import Robot
@@ -70,7 +71,7 @@ class TrackingTask(Task):
         try:
             self._resolve(robot)
         except UnknownNameError as error:
-            raise UnknownNameError(f"task {self.name!r}: {error}") from None
+            raise error.reworded(f"task {self.name!r}: {error}") from None
         self._robot = robot
         self.reset()
 
@@ -226,6 +227,17 @@ class TrackingTask(Task):
             ),
             error=error,
         )
+
+    def _words(self) -> list[str]:
+        goal = self._target.goal
+        if isinstance(goal, np.ndarray):
+            if goal.ndim == 2:  # a rotation, or a pose
+                turn = quaternion_from_matrix(goal[:3, :3])
+                goal = np.array([*goal[:3, 3:].ravel(), *turn])
+            return [f"target={brief(goal)}"]
+        return [
+            "target=what it finds" if isinstance(goal, Hold) else f"target={type(goal).__name__}"
+        ]
 
     def _require_bound(self, robot: Robot) -> None:
         if robot is not self._robot:

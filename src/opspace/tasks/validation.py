@@ -108,6 +108,17 @@ def shown(value: object) -> str:
     return text if len(text) <= _LONG else f"{text[:_LONG]}..."
 
 
+def brief(numbers: ArrayLike) -> str:
+    """Write numbers for a person, on one line, with four digits."""
+    written = np.array2string(
+        np.asarray(numbers, dtype=float),
+        formatter={"float_kind": "{:.4g}".format},
+        separator=", ",
+        threshold=16,
+    )
+    return " ".join(written.split())
+
+
 def _fits(got: tuple[int, ...], wanted: tuple[int | None, ...]) -> bool:
     return len(got) == len(wanted) and all(
         want is None or size == want for size, want in zip(got, wanted, strict=True)

@@ -23,7 +23,7 @@ from opspace.view import panels
 from opspace.view.charts import Chart, sigma_columns, torque_columns
 from opspace.view.controls import Ask, RunControls, StackControls
 from opspace.view.frame import FrameReader
-from opspace.view.scene import Scene
+from opspace.view.scene import RobotScene
 
 PICTURES = 25.0
 """Pictures per second."""
@@ -64,7 +64,7 @@ class Page:
             self._server = viser.ViserServer(host, port, label="opspace", verbose=False)
         self._controls: StackControls | None = None
         self._build(directory, ask)
-        self._scene = Scene(
+        self._scene = RobotScene(
             self._server,
             _robot(self._about["robot"]),
             self._about["tasks"],

@@ -31,7 +31,7 @@ _TRAIL_POINTS = 80
 _TARGET_COLOR, _TRAIL_COLOR = (221, 46, 36), (0, 68, 136)
 
 
-class Scene:
+class RobotScene:
     """Everything in three dimensions.
 
     Args:
