@@ -7,13 +7,16 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
+from opspace.law import PROFILES
 from opspace.scenario.fields import Checked, Entry, Number, listed, problem, shown
 from opspace.scenario.task_entries import AnyTask
 
 if TYPE_CHECKING:
     from typing_extensions import Self
 
-ProfileName = Literal["linear", "cubic", "quintic", "half-sine", "tanh", "step"]
+    ProfileName = str
+else:  # whatever there is, without a second list
+    ProfileName = Literal[PROFILES]
 """``step`` is the hard switch that all of this avoids, for comparisons."""
 
 Kind = Literal["insert", "remove", "move", "swap"]

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from pydantic import Field, PrivateAttr, ValidationInfo, field_validator, model_validator
 
 from opspace.errors import ScenarioError
+from opspace.law.scalars import LIMIT_LAWS
 from opspace.scenario.document import Document, Key, key_text
 from opspace.scenario.events import Event, ProfileName, check_events
 from opspace.scenario.fields import Checked, Entry, Number, problem, shown, whole
@@ -16,6 +17,10 @@ from opspace.scenario.task_entries import AnyTask
 
 if TYPE_CHECKING:
     from typing_extensions import Self
+
+    LimitMode = str
+else:
+    LimitMode = Literal[tuple(LIMIT_LAWS)]
 
 
 class SingularityEntry(Entry):
@@ -47,7 +52,7 @@ class SingularityEntry(Entry):
 class JointLimitsEntry(Entry):
     """How joints are kept within their limits."""
 
-    mode: Literal["admissible", "buffer"] = Field(
+    mode: LimitMode = Field(
         default="admissible",
         description="act on the admissible acceleration, or within a buffer on the position",
     )
