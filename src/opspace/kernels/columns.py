@@ -6,6 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from opspace.command import Status
+
 # Kinds of tasks.
 OWN, MOTION, JOINTS = range(3)
 # Where motion is measured.
@@ -71,9 +73,10 @@ VARIABLE_SIZE = 9
 ) = range(16)
 OPTION_SIZE = 16
 
-# What a tick answers when there is no torque, and what a hard torque counts in its answer.
+# What a tick answers when there is no torque.
 STATE_NOT_FINITE, NOT_FINITE, NOT_POSITIVE_DEFINITE = -1, -2, -3
-SOLVE = 1024
+SOLVE = 1 << max(Status).bit_length()
+"""What a hard torque counts in its answer, above every combination of `opspace.Status`."""
 
 
 class Tick(NamedTuple):
