@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 
 from opspace.machine.jit import jit
-from opspace.robots.bodies import ALIGNED, HINGE, SLIDE, TRANSLATION
+from opspace.robots.joint_kinds import ALIGNED, HINGE, SLIDE, TRANSLATION
 
 # Columns of Dynamics.inertia, about the origin of the world: mass, mass times centre, tensor.
 MASS, MOMENT, TENSOR = 0, 1, 4

@@ -8,46 +8,8 @@ coordinates, û = U⁻¹ Γ and Ĵ = J U⁻ᵀ, rows of different branches have 
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
-
-import numpy as np
 
 from opspace.machine.jit import jit
-from opspace.machine.record import Handle
-
-
-class Inertia(NamedTuple):
-    """Factor of an inertia, and where it is not zero.
-
-    Attributes:
-        U: (n, n) upper triangular, M = U Uᵀ.
-        inverse: (n,) one over its diagonal: a division takes as long as ten products.
-        before: (n,) the coordinate before each one on the way to the base, −1 for none.
-        end: (n,) the coordinate after the last one that each one carries.
-    """
-
-    U: np.ndarray
-    inverse: np.ndarray
-    before: np.ndarray
-    end: np.ndarray
-
-
-def make_inertia(before: np.ndarray) -> Inertia:
-    """Make the memory for the factor of a tree, or of a chain where its branches are not in order."""
-    n = before.size
-    end, carried = np.arange(1, n + 1), np.ones(n, np.int64)
-    for a in range(n - 1, -1, -1):
-        if before[a] >= 0:
-            end[before[a]] = max(end[before[a]], end[a])
-            carried[before[a]] += carried[a]
-    if not np.array_equal(end - np.arange(n), carried):
-        return make_inertia(np.arange(n) - 1)
-    return Inertia(np.zeros((n, n)), np.zeros(n), np.array(before, np.int64), end)
-
-
-def inertia_handle(inertia: Inertia) -> Handle:
-    """Make the handle with which compiled functions reach an `Inertia`."""
-    return Handle("Inertia", inertia._asdict())
 
 
 @jit

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from functools import partial
-from typing import NamedTuple
 
 import numpy as np
 
@@ -13,20 +12,6 @@ from opspace.kernels.tick import tick
 from opspace.machine.jit import jit
 
 LARGEST = float(np.finfo(float).max)
-
-
-class Remembered(NamedTuple):
-    """What a tick takes over from the one before, the same for every state of a batch.
-
-    Attributes:
-        group: (variables,) how each activation is blended.
-        remembers: (tasks,) whether it is known which way round a rotation went.
-        turn: (tasks, 4) that rotation, quaternion wxyz.
-    """
-
-    group: np.ndarray
-    remembers: np.ndarray
-    turn: np.ndarray
 
 
 @partial(jit, nogil=True)

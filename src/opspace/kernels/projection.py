@@ -3,86 +3,14 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
-
-import numpy as np
 
 from opspace.kernels.algebra import cholesky, solve_lower, solve_lower_transposed
 from opspace.kernels.inertia import acceleration_of, unit_row, whitened_of
 from opspace.law.nearest import HARD, SOFT, UNBOUNDED
 from opspace.machine.jit import jit
-from opspace.machine.record import Handle
 
 ROUNDING = 1e-13
 """A bound that is broken by less than this part of the numbers involved is kept."""
-
-
-class Bounds(NamedTuple):
-    """Bounds on accelerations and torques, and the memory to keep them.
-
-    Attributes:
-        lower: (n,) least accelerations, -inf where there is none.
-        upper: (n,) largest accelerations, inf where there is none.
-        least: (n,) least torques beside the bias, N·m.
-        most: (n,) largest torques beside the bias, N·m.
-        normal: (4n, n) every bound as unit normal · x <= bound, in x = Uᵀ q̈.
-        bound: (4n,) the bounds.
-        softness: (4n,) their softness.
-        multiplier: (4n,) multipliers of the bounds.
-        wanted: (4n,) multipliers of the bounds that hold, if they held alone.
-        active: (4n,) the bounds that hold.
-        x: (n,) the point that is projected.
-        y: (n,) its projection.
-        row: (n,) scratch.
-        r: (4n,) scratch.
-        G: (4n, 4n) scratch.
-        factor: (4n, 4n) scratch.
-    """
-
-    lower: np.ndarray
-    upper: np.ndarray
-    least: np.ndarray
-    most: np.ndarray
-    normal: np.ndarray
-    bound: np.ndarray
-    softness: np.ndarray
-    multiplier: np.ndarray
-    wanted: np.ndarray
-    active: np.ndarray
-    x: np.ndarray
-    y: np.ndarray
-    row: np.ndarray
-    r: np.ndarray
-    G: np.ndarray
-    factor: np.ndarray
-
-
-def make_bounds(n: int) -> Bounds:
-    """Make bounds for n joints, all infinite."""
-    m = 4 * n
-    return Bounds(
-        lower=np.full(n, -np.inf),
-        upper=np.full(n, np.inf),
-        least=np.full(n, -np.inf),
-        most=np.full(n, np.inf),
-        normal=np.zeros((m, n)),
-        bound=np.zeros(m),
-        softness=np.zeros(m),
-        multiplier=np.zeros(m),
-        wanted=np.zeros(m),
-        active=np.zeros(m, np.int64),
-        x=np.zeros(n),
-        y=np.zeros(n),
-        row=np.zeros(n),
-        r=np.zeros(m),
-        G=np.zeros((m, m)),
-        factor=np.zeros((m, m)),
-    )
-
-
-def bounds_handle(bounds: Bounds) -> Handle:
-    """Make the handle with which compiled functions reach `Bounds`."""
-    return Handle("Bounds", bounds._asdict())
 
 
 @jit

@@ -7,7 +7,7 @@ from opspace.kernels.level import project, solve_level, take_alternative
 from opspace.kernels.saturation import room_for
 from opspace.machine.jit import jit
 
-# Columns of ``Space.cursor``.
+# Columns of ``Space.cursor``: corners of a node, the next one, corners of its group, next alternative.
 FIRST, END, NEXT, GROUP, GROUP_END, ALTERNATIVE = range(6)
 
 
