@@ -12,19 +12,7 @@ from opspace.robots.motion_axes import MotionAxes
 
 
 class Sizes(NamedTuple):
-    """Sizes of a plan.
-
-    Attributes:
-        n: Joints.
-        tasks: Tasks.
-        rows: Rows of all tasks.
-        slot_rows: Rows of all places of tasks.
-        slots: Places of tasks.
-        levels: Levels of the stack.
-        variables: Activations in time.
-        limits: Joint limits, sides counted.
-        corners: Corners that the blend can have.
-    """
+    """Sizes of a plan; `opspace.plan.records.SIZES` says of what."""
 
     n: int
     tasks: int
