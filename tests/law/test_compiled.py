@@ -9,13 +9,13 @@ from hypothesis import strategies as st
 
 from opspace.kernels.algebra import cholesky, singular_values
 from opspace.kernels.corners import sort_corners
-from opspace.kernels.inertia import inertia_handle, make_inertia
 from opspace.kernels.scalars import profile, ramp
 from opspace.kernels.walk import begin, pass_on, slot_bit, walk
 from opspace.law import SigmaBuffer, TaskSet, blended_torque, corners
 from opspace.law.activation import PROFILES, Profile, Ramp
 from opspace.law.hierarchy import whiten
-from opspace.plan.space import make_space, space_handle
+from opspace.plan.memory import Sizes, make_inertia
+from opspace.plan.records import SPACE
 
 
 def random_stack(rng):
@@ -50,9 +50,12 @@ def compiled_torque(L, tasks, blend, buffer):
     )
     weights = np.array([corner.weight for corner in blend])
     count = sort_corners(masks, weights, len(blend))
-    inertia = inertia_handle(make_inertia(np.arange(n) - 1))
-    space = make_space(n, len(ranks) + 1, row, inertia)
-    s = space_handle(space)
+    size = Sizes(
+        n=n, tasks=0, rows=row, slot_rows=row, slots=0, levels=len(ranks), variables=0, limits=0,
+        corners=1,
+    )  # fmt: skip
+    space = SPACE.make(size.by_name(), {"inertia": make_inertia(np.arange(n) - 1)})
+    s = space.handle()
     levels = len(ranks) + 1
     begin(n, levels, s)
     pass_on(0, n, s)

@@ -7,14 +7,13 @@ from hypothesis import strategies as st
 from opspace.kernels.inertia import (
     acceleration_of,
     factor,
-    inertia_handle,
-    make_inertia,
     torque_of,
     unit_row,
     whiten,
     whiten_rows,
     whitened_of,
 )
+from opspace.plan.memory import make_inertia
 
 
 def random_tree(seed):
@@ -45,7 +44,7 @@ def test_the_factor_is_one_and_has_the_zeros_of_the_tree(seed):
     rng, before, moves, M = random_tree(seed)
     n = before.size
     inertia = make_inertia(before)
-    f, U = inertia_handle(inertia), inertia.U
+    f, U = inertia.handle(), inertia.U
     assert factor(M, f)
     size = np.max(np.abs(M))
     np.testing.assert_allclose(U @ U.T, M, rtol=0, atol=1e-12 * size)
@@ -76,4 +75,4 @@ def test_what_is_not_positive_definite_has_no_factor(seed):
     rng, before, _, M = random_tree(seed)
     a = rng.integers(before.size)
     M[a, a] = rng.choice([-1.0, 0.0, np.nan])
-    assert not factor(M, inertia_handle(make_inertia(before)))
+    assert not factor(M, make_inertia(before).handle())

@@ -6,10 +6,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from opspace.kernels.inertia import factor, inertia_handle, make_inertia
-from opspace.kernels.projection import bounds_handle, make_bounds
+from opspace.kernels.inertia import factor
 from opspace.kernels.projection import nearest_acceleration as compiled
 from opspace.law import excess, nearest_acceleration
+from opspace.plan.memory import make_inertia
+from opspace.plan.records import BOUNDS
 
 INF = np.inf
 
@@ -77,12 +78,12 @@ def test_it_is_the_nearest_in_the_inertia_metric(seed):
 def test_compiled_is_readable(seed, contradictory):
     L, start, *bounds = problem(seed, contradictory)
     x = start.copy()
-    given_ = make_bounds(x.size)
+    given_ = BOUNDS.make({"n": x.size})
     for array, values in zip(given_, bounds, strict=False):
         array[:] = values
-    inertia = inertia_handle(make_inertia(np.arange(x.size) - 1))
+    inertia = make_inertia(np.arange(x.size) - 1).handle()
     assert factor(L @ L.T, inertia)
-    compiled(inertia, x, bounds_handle(given_))
+    compiled(inertia, x, given_.handle())
     readable = nearest_acceleration(L, start, *bounds)
     assert np.allclose(x, readable, rtol=1e-6, atol=1e-5)
 

@@ -23,7 +23,7 @@ def assert_same(robot: Robot, seed: int, fast: float = 1.0) -> None:
     found = make_dynamics(model.bodies)
     q, v = random_state(robot, np.random.default_rng(seed))
     robot.update(q, fast * v)
-    evaluate(model.bodies, np.array(robot.q), np.array(robot.v), found)
+    evaluate(model.bodies.handle(), np.array(robot.q), np.array(robot.v), found.handle())
     assert_close(found.M, robot.M)
     assert_close(found.bias, robot.bias)
     for frame, place in model.frames.items():
@@ -91,9 +91,9 @@ def test_a_quaternion_may_have_any_length(files: dict[str, Path]) -> None:
     model = robot.rigid_model()  # type: ignore[attr-defined]
     one, other = make_dynamics(model.bodies), make_dynamics(model.bodies)
     q, v = random_state(robot, np.random.default_rng(0))
-    evaluate(model.bodies, q, v, one)
+    evaluate(model.bodies.handle(), q, v, one.handle())
     q[3:7] *= 7.0
-    evaluate(model.bodies, q, v, other)
+    evaluate(model.bodies.handle(), q, v, other.handle())
     assert_close(one.M, other.M)
     assert_close(one.bias, other.bias)
 
@@ -104,10 +104,10 @@ def test_a_second_state_owes_nothing_to_the_first() -> None:
     fresh, used = make_dynamics(model.bodies), make_dynamics(model.bodies)
     rng = np.random.default_rng(0)
     for _ in range(3):
-        evaluate(model.bodies, *random_state(robot, rng), used)
+        evaluate(model.bodies.handle(), *random_state(robot, rng), used.handle())
     q, v = random_state(robot, rng)
-    evaluate(model.bodies, q, v, fresh)
-    evaluate(model.bodies, q, v, used)
+    evaluate(model.bodies.handle(), q, v, fresh.handle())
+    evaluate(model.bodies.handle(), q, v, used.handle())
     for a, b in zip(fresh, used, strict=True):
         np.testing.assert_array_equal(a, b)
 

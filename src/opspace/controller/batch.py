@@ -12,10 +12,11 @@ from numpy.typing import ArrayLike
 
 from opspace.errors import InputError
 from opspace.kernels.columns import OWN, REMEMBERS, TURN
-from opspace.kernels.many_states import Remembered, ticks
+from opspace.kernels.many_states import ticks
 from opspace.machine.record import Handle
 from opspace.plan.pack_task import kind_of
 from opspace.plan.plan import Plan
+from opspace.plan.records import REMEMBERED
 from opspace.robots.adapter import AdapterBase
 from opspace.robots.bodies import make_dynamics
 from opspace.robots.motion_axes import MotionAxes
@@ -204,9 +205,9 @@ def _remembered(plan: Plan, before: Plan | None) -> Handle:
     tick.kind[:, REMEMBERS] = 0
     if before is not None:
         plan.go_on_from(before)
-    found = Remembered(
-        group=tick.group.copy(),
-        remembers=tick.kind[:, REMEMBERS].copy(),
-        turn=tick.numbers[:, TURN : TURN + 4].copy(),
-    )
-    return Handle("Remembered", found._asdict())
+    found = {
+        "group": tick.group.copy(),
+        "remembers": tick.kind[:, REMEMBERS].copy(),
+        "turn": tick.numbers[:, TURN : TURN + 4].copy(),
+    }
+    return REMEMBERED.make({}, found).handle()

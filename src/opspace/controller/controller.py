@@ -41,7 +41,7 @@ from opspace.stack import Member
 from opspace.tasks.task import CHANGES
 from opspace.tasks.validation import finite, numbers
 
-STATUSES = tuple(Status(bits) for bits in range(2048))
+STATUSES = tuple(map(Status, range(SOLVE)))
 NEW = tuple.__new__
 TIME_JUMP, FAULT = int(Status.TIME_JUMP), int(Status.FAULT)
 

@@ -10,16 +10,18 @@ from typing import Any
 
 import numpy as np
 
-from opspace.kernels.columns import OPTION_SIZE, Tick
-from opspace.kernels.many_states import Remembered, ticks
+from opspace.kernels.columns import OPTION_SIZE
+from opspace.kernels.many_states import ticks
 from opspace.kernels.spectrum import spectrum
 from opspace.kernels.tick import tick
 from opspace.machine.compile_apart import Calls, compile_apart
+from opspace.machine.field_table import Record
 from opspace.machine.jit import is_kept
 from opspace.machine.record import Handle
-from opspace.plan.memory import Sizes, make_tick, tick_handle
-from opspace.plan.space import Space
-from opspace.robots.bodies import ALIGNED, RigidBodies, make_dynamics
+from opspace.plan.memory import Sizes, make_tick
+from opspace.plan.records import REMEMBERED
+from opspace.robots.bodies import RIGID_BODIES, make_dynamics
+from opspace.robots.joint_kinds import ALIGNED
 from opspace.robots.motion_axes import MotionAxes
 from opspace.robots.rigid_model import RigidModel
 
@@ -59,7 +61,7 @@ def compiled_batch() -> float:
 def first_tick() -> list[tuple[Any, tuple[Any, ...]]]:
     """Return what is called to have the tick and its report compiled."""
     return [
-        (tick, (0.0, tick_handle(*_smallest(_axes())))),
+        (tick, (0.0, _smallest(_axes()))),
         (spectrum, (np.ones((1, 1)), np.zeros(OPTION_SIZE))),
     ]
 
@@ -69,10 +71,9 @@ def first_batch() -> list[tuple[Any, tuple[Any, ...]]]:
     bodies = _one_body()
     state = np.zeros((1, 1))
     axes = RigidModel(bodies, {}, ()).motion_axes(make_dynamics(bodies), np.zeros(1), np.zeros(1))
-    before = Remembered(np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros((0, 4)))
-    start = Handle("Remembered", before._asdict())
-    k = tick_handle(*_smallest(axes))
-    return [(ticks, (0.0, k, start, state, state, np.ones((1, 0)), 0, 1, state.copy()))]
+    before = REMEMBERED.make({"variables": 0, "tasks": 0}).handle()
+    smallest = _smallest(axes)
+    return [(ticks, (0.0, smallest, before, state, state, np.ones((1, 0)), 0, 1, state.copy()))]
 
 
 def ready(what: str, calls: Calls) -> float:
@@ -123,33 +124,23 @@ def _axes() -> MotionAxes:
     )
 
 
-def _one_body() -> RigidBodies:
+def _one_body() -> Record:
     """Make a body of one kilogram behind one hinge."""
-    two, integers = np.zeros(2), np.int64
-    place = np.zeros((2, 12))
-    place[:, [0, 4, 8]] = 1.0
-    return RigidBodies(
-        kind=np.full(2, ALIGNED, integers),
-        parent=np.zeros(2, integers),
-        place=place,
-        axis=np.array([[0.0, 0.0, 1.0]] * 2),
-        along=np.full(2, 2, integers),
-        first_q=np.zeros(2, integers),
-        first_v=np.zeros(2, integers),
-        width=np.array([0, 1], integers),
-        mass=two + 1.0,
-        centre=np.zeros((2, 3)),
-        tensor=np.ones((2, 6)),
-        before=np.array([-1], integers),
-        armature=np.zeros(1),
-        gravity=np.zeros(3),
-    )
+    bodies = RIGID_BODIES.make({"bodies": 2, "n": 1})
+    bodies.kind[:] = ALIGNED
+    bodies.place[:, [0, 4, 8]] = 1.0
+    bodies.axis[:, 2] = 1.0
+    bodies.along[:] = 2
+    bodies.width[1] = 1
+    bodies.mass[:] = 1.0
+    bodies.tensor[:] = 1.0
+    bodies.before[:] = -1
+    return bodies
 
 
-def _smallest(axes: MotionAxes) -> tuple[Tick, Space, MotionAxes]:
+def _smallest(axes: MotionAxes) -> Handle:
     """Make the arrays of a tick for one joint and no task."""
     size = Sizes(
         n=1, tasks=0, rows=0, slot_rows=0, slots=0, levels=0, variables=0, limits=0, corners=1
     )
-    memory, space, _ = make_tick(size, axes, np.ones(1), np.zeros(OPTION_SIZE))
-    return memory, space, axes
+    return make_tick(size, axes, np.ones(1), np.zeros(OPTION_SIZE))[0].handle()

@@ -1,10 +1,8 @@
-"""What the compiled tick reads and writes: one record of arrays."""
+"""Columns and codes of the arrays of a tick; `opspace.plan.records` describes the arrays."""
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
-import numpy as np
+from opspace.command import Status
 
 # Kinds of tasks.
 OWN, MOTION, JOINTS = range(3)
@@ -69,90 +67,7 @@ VARIABLE_SIZE = 9
 ) = range(16)
 OPTION_SIZE = 16
 
-# What a tick answers when there is no torque, and what a hard torque counts in its answer.
+# What a tick answers when there is no torque.
 STATE_NOT_FINITE, NOT_FINITE, NOT_POSITIVE_DEFINITE = -1, -2, -3
-SOLVE = 1024
-
-
-class Tick(NamedTuple):
-    """Everything that one tick reads, writes and works with.
-
-    The robot: ``q``, ``v``, ``M``, ``bias``, ``axes``, ``placement`` and ``parent`` of
-    `opspace.robots.motion_axes.MotionAxes`; ``mass_place`` (links, 2) body and joint, ``mass``
-    (links, 4) kg and centre on the body.
-
-    The plan, which changes when a transition begins or ends: ``kind`` and ``numbers`` of each task;
-    of each row ``coordinate`` (joint tasks), ``select`` (rows, 6), ``goal`` (rows, 3: position,
-    velocity, acceleration of joint tasks), ``kp``, ``kv``, ``row_weight`` = 1/√reference;
-    ``variable`` and ``group`` of each activation that moves or rests, the tasks' presences first;
-    ``slots`` (slots, 3: depth, first row, rows) in the order of the levels,
-    ``slot_on`` and ``slot_off``: variables that must be on or off for a task to be there,
-    ``slot_place``: those of them that choose its place; ``own``: activation of each task by its
-    own function; ``limit_joint`` and ``limit`` (limits, 7: side, position, braking acceleration,
-    margin, what it asks for, largest speed, disturbance) of joint limits; ``torque_limit``; ``option``.
-
-    What it writes, all in one block of memory: ``tau``, ``h`` of each task, ``share`` of each slot,
-    ``error`` and ``wanted`` of each row, ``limit_h``, ``limit_wanted``, ``scale`` of each level (joint
-    limits first, what damps the rest last), and for the report of the levels ``Jw`` (rows, n),
-    whitened, and the memory of the walk.
-
-    The rest is scratch.
-    """
-
-    q: np.ndarray
-    v: np.ndarray
-    M: np.ndarray
-    bias: np.ndarray
-    axes: np.ndarray
-    placement: np.ndarray
-    parent: np.ndarray
-    mass_place: np.ndarray
-    mass: np.ndarray
-    kind: np.ndarray
-    numbers: np.ndarray
-    coordinate: np.ndarray
-    select: np.ndarray
-    goal: np.ndarray
-    kp: np.ndarray
-    kv: np.ndarray
-    row_weight: np.ndarray
-    variable: np.ndarray
-    group: np.ndarray
-    slots: np.ndarray
-    slot_on: np.ndarray
-    slot_off: np.ndarray
-    slot_place: np.ndarray
-    own: np.ndarray
-    limit_joint: np.ndarray
-    limit: np.ndarray
-    torque_limit: np.ndarray
-    option: np.ndarray
-    tau: np.ndarray
-    h: np.ndarray
-    share: np.ndarray
-    error: np.ndarray
-    wanted: np.ndarray
-    limit_h: np.ndarray
-    limit_wanted: np.ndarray
-    scale: np.ndarray
-    Jw: np.ndarray
-    J: np.ndarray
-    drift: np.ndarray
-    fw: np.ndarray
-    velocity: np.ndarray
-    acceleration: np.ndarray
-    motion: np.ndarray
-    motion_J: np.ndarray
-    motion_error: np.ndarray
-    value: np.ndarray
-    chained: np.ndarray
-    order: np.ndarray
-    corner_on: np.ndarray
-    corner_weight: np.ndarray
-    limit_on: np.ndarray
-    limit_weight: np.ndarray
-    limit_order: np.ndarray
-    rest: np.ndarray
-    u: np.ndarray
-    drop: np.ndarray
-    joint_acceleration: np.ndarray
+SOLVE = 1 << max(Status).bit_length()
+"""What a hard torque counts in its answer, above every combination of `opspace.Status`."""

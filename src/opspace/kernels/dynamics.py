@@ -9,14 +9,14 @@ from __future__ import annotations
 import math
 
 from opspace.machine.jit import jit
-from opspace.robots.bodies import ALIGNED, HINGE, SLIDE, TRANSLATION
+from opspace.robots.joint_kinds import ALIGNED, HINGE, SLIDE, TRANSLATION
 
 # Columns of Dynamics.inertia, about the origin of the world: mass, mass times centre, tensor.
 MASS, MOMENT, TENSOR = 0, 1, 4
 
 
 @jit
-def evaluate(b, q, v, d):
+def evaluate(bodies, q, v, dynamics):
     """Compute inertia, bias, motion axes and placements at one state.
 
         M = Σᵢ Jᵢᵀ Iᵢ Jᵢ + armature      b + g = Σᵢ Jᵢᵀ (Iᵢ (J̇ᵢ v − g) + Vᵢ ×* Iᵢ Vᵢ),  Vᵢ = Jᵢ v
@@ -24,44 +24,55 @@ def evaluate(b, q, v, d):
     by the composite-rigid-body and the recursive Newton-Euler algorithm.
 
     Args:
-        b: The bodies.
-        q: (nq,) configuration; quaternions wxyz, of any length but zero.
-        v: (n,) velocity; that of a ball joint is the angular velocity in the axes of its body.
-        d: `Dynamics`, overwritten.
+        bodies: `RIGID_BODIES`.
+        q: (nq,) configuration, rad or m; quaternions wxyz, of any length but zero.
+        v: (n,) velocity, rad/s or m/s; that of a ball joint is the angular velocity in the axes of
+            its body.
+        dynamics: `DYNAMICS`, overwritten: M (n, n) kg·m², bias (n,) N·m, axes, placement.
     """
     # Rows of arrays are passed on: a record of arrays would be copied at every call.
     for i in range(3):
-        d.acceleration[0, i] = -b.gravity[i]
-    for i in range(1, b.kind.shape[0]):
-        p, a, k = b.parent[i], b.first_v[i], b.first_q[i]
-        x = d.placement[i]
-        _place(d.placement[p], b.place[i], x)
-        if b.kind[i] == ALIGNED:
-            _turn_aligned(x, b.along[i], q[k], d.axes[a])
+        dynamics.acceleration[0, i] = -bodies.gravity[i]
+    for i in range(1, bodies.kind.shape[0]):
+        p, a, k = bodies.parent[i], bodies.first_v[i], bodies.first_q[i]
+        x = dynamics.placement[i]
+        _place(dynamics.placement[p], bodies.place[i], x)
+        if bodies.kind[i] == ALIGNED:
+            _turn_aligned(x, bodies.along[i], q[k], dynamics.axes[a])
             for c in range(6):
-                d.step[i, c] = d.axes[a, c] * v[a]
+                dynamics.step[i, c] = dynamics.axes[a, c] * v[a]
         else:
-            _turn_or_shift(b.kind[i], b.axis[i], q[k:], v[a:], x, d.axes[a:], d.step[i])
-        _move(d.velocity[p], d.acceleration[p], d.step[i], d.velocity[i], d.acceleration[i])
-        _weigh(x, b.mass[i], b.centre[i], b.tensor[i], d.inertia[i])
-        _push(d.inertia[i], d.velocity[i], d.acceleration[i], d.force[i])
-    for i in range(b.kind.shape[0] - 1, 0, -1):
-        for a in range(b.first_v[i], b.first_v[i] + b.width[i]):
-            d.bias[a] = _dot(d.axes[a], d.force[i])
-            _row(a, d.inertia[i], d.axes, b.before, d.M)
-            d.M[a, a] += b.armature[a]
-        p = b.parent[i]
+            _turn_or_shift(
+                bodies.kind[i], bodies.axis[i], q[k:], v[a:], x, dynamics.axes[a:], dynamics.step[i]
+            )
+        _move(
+            dynamics.velocity[p],
+            dynamics.acceleration[p],
+            dynamics.step[i],
+            dynamics.velocity[i],
+            dynamics.acceleration[i],
+        )
+        _weigh(x, bodies.mass[i], bodies.centre[i], bodies.tensor[i], dynamics.inertia[i])
+        _push(
+            dynamics.inertia[i], dynamics.velocity[i], dynamics.acceleration[i], dynamics.force[i]
+        )
+    for i in range(bodies.kind.shape[0] - 1, 0, -1):
+        for a in range(bodies.first_v[i], bodies.first_v[i] + bodies.width[i]):
+            dynamics.bias[a] = _dot(dynamics.axes[a], dynamics.force[i])
+            _row(a, dynamics.inertia[i], dynamics.axes, bodies.before, dynamics.M)
+            dynamics.M[a, a] += bodies.armature[a]
+        p = bodies.parent[i]
         if p == 0:
             continue
         for c in range(6):
-            d.force[p, c] += d.force[i, c]
+            dynamics.force[p, c] += dynamics.force[i, c]
         for c in range(10):
-            d.inertia[p, c] += d.inertia[i, c]
+            dynamics.inertia[p, c] += dynamics.inertia[i, c]
 
 
 @jit
 def _place(p, place, x):
-    """Placement of a joint, before it turns."""
+    """Placement x (12,) of a joint on the body at p (12,), before it turns, m."""
     for row in range(3):
         u, w, z = p[row], p[3 + row], p[6 + row]
         for c in range(0, 9, 3):
@@ -71,7 +82,7 @@ def _place(p, place, x):
 
 @jit
 def _turn_aligned(x, along, angle, s):
-    """R ← R Rot(e, angle) about one of its own axes, and the motion axis."""
+    """R ← R Rot(e, angle) about one of its own axes, and the motion axis s (6,); angle in rad."""
     c, sine = math.cos(angle), math.sin(angle)
     one, two = 3 * ((along + 1) % 3), 3 * ((along + 2) % 3)
     for row in range(3):
@@ -83,7 +94,7 @@ def _turn_aligned(x, along, angle, s):
 
 @jit
 def _turn_or_shift(kind, axis, q, v, x, axes, step):
-    """Placement of the body behind any other joint, its motion axes, and its own motion S v."""
+    """Placement of the body behind any other joint, its axes, and its own motion S v (6,)."""
     count = 1
     if kind == HINGE:
         sine = math.sin(0.5 * q[0])
@@ -160,7 +171,7 @@ def _shift(s, x, u, w, z, way):
 
 @jit
 def _move(V, A, step, own, ahead):
-    """Vᵢ = V_p + S v, and its rate V_p × S v + A_p: the axes S move with the body."""
+    """Vᵢ = V_p + S v (6,), and its rate V_p × S v + A_p: the axes S move with the body."""
     v0, v1, v2, w0, w1, w2 = V[0], V[1], V[2], V[3], V[4], V[5]
     x0, x1, x2, r0, r1, r2 = step[0], step[1], step[2], step[3], step[4], step[5]
     own[0], own[1], own[2] = v0 + x0, v1 + x1, v2 + x2
@@ -175,7 +186,7 @@ def _move(V, A, step, own, ahead):
 
 @jit
 def _weigh(x, m, centre, t, Y):
-    """Inertia of a body: R I Rᵀ + m (c·c 1 − c cᵀ), with c its centre of mass."""
+    """Inertia Y (10,) of a body: R I Rᵀ + m (c·c 1 − c cᵀ), with c its centre of mass."""
     c0, c1, c2 = _rotated(x, centre)
     c0, c1, c2 = c0 + x[9], c1 + x[10], c2 + x[11]
     Y[MASS] = m
@@ -220,7 +231,7 @@ def _momentum(Y, s):
 
 @jit
 def _push(Y, V, A, f):
-    """Force that moves a body: I A + V ×* I V."""
+    """Force f (6,) that moves a body, N and N·m: I A + V ×* I V."""
     p0, p1, p2, l0, l1, l2 = _momentum(Y, V)
     f0, f1, f2, n0, n1, n2 = _momentum(Y, A)
     v0, v1, v2, w0, w1, w2 = V[0], V[1], V[2], V[3], V[4], V[5]

@@ -8,56 +8,18 @@ coordinates, û = U⁻¹ Γ and Ĵ = J U⁻ᵀ, rows of different branches have 
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
-
-import numpy as np
 
 from opspace.machine.jit import jit
-from opspace.machine.record import Handle
-
-
-class Inertia(NamedTuple):
-    """Factor of an inertia, and where it is not zero.
-
-    Attributes:
-        U: (n, n) upper triangular, M = U Uᵀ.
-        inverse: (n,) one over its diagonal: a division takes as long as ten products.
-        before: (n,) the coordinate before each one on the way to the base, −1 for none.
-        end: (n,) the coordinate after the last one that each one carries.
-    """
-
-    U: np.ndarray
-    inverse: np.ndarray
-    before: np.ndarray
-    end: np.ndarray
-
-
-def make_inertia(before: np.ndarray) -> Inertia:
-    """Make the memory for the factor of a tree, or of a chain where its branches are not in order."""
-    n = before.size
-    end, carried = np.arange(1, n + 1), np.ones(n, np.int64)
-    for a in range(n - 1, -1, -1):
-        if before[a] >= 0:
-            end[before[a]] = max(end[before[a]], end[a])
-            carried[before[a]] += carried[a]
-    if not np.array_equal(end - np.arange(n), carried):
-        return make_inertia(np.arange(n) - 1)
-    return Inertia(np.zeros((n, n)), np.zeros(n), np.array(before, np.int64), end)
-
-
-def inertia_handle(inertia: Inertia) -> Handle:
-    """Make the handle with which compiled functions reach an `Inertia`."""
-    return Handle("Inertia", inertia._asdict())
 
 
 @jit
-def factor(M, f):
-    """Factor M = U Uᵀ, from the tips to the base.
+def factor(M, inertia):
+    """Factor M = U Uᵀ, (n, n) kg·m², from the tips to the base.
 
     Returns:
         Whether M is positive definite; otherwise U is not usable.
     """
-    U, inverse, before, end = f.U, f.inverse, f.before, f.end
+    U, inverse, before, end = inertia.U, inertia.inverse, inertia.before, inertia.end
     for a in range(U.shape[0] - 1, -1, -1):
         s = M[a, a]
         for k in range(a + 1, end[a]):
@@ -78,9 +40,9 @@ def factor(M, f):
 
 
 @jit
-def whiten_rows(f, last, first, end, X):
-    """Overwrite rows of Jacobians that move coordinate ``last`` and those before with X U⁻ᵀ."""
-    U, inverse, before = f.U, f.inverse, f.before
+def whiten_rows(inertia, last, first, end, X):
+    """Overwrite rows ``first`` to ``end`` − 1 of X (rows, n), of a frame behind ``last``, with X U⁻ᵀ."""
+    U, inverse, before = inertia.U, inertia.inverse, inertia.before
     a = last
     while a >= 0:
         # Row by row inside, so that one need not wait for the other.
@@ -93,9 +55,9 @@ def whiten_rows(f, last, first, end, X):
 
 
 @jit
-def whiten(f, x):
-    """Overwrite any row of a Jacobian with x U⁻ᵀ, and a torque with the whitened one, U⁻¹ x."""
-    U, inverse, end = f.U, f.inverse, f.end
+def whiten(inertia, x):
+    """Overwrite any row x (n,) of a Jacobian with x U⁻ᵀ, and a torque [N·m] with U⁻¹ x [√J/s]."""
+    U, inverse, end = inertia.U, inertia.inverse, inertia.end
     for a in range(U.shape[0] - 1, -1, -1):
         s = x[a]
         for k in range(a + 1, end[a]):
@@ -104,9 +66,9 @@ def whiten(f, x):
 
 
 @jit
-def unit_row(f, a, weight, x):
-    """Fill x with the whitened row of a joint: weight · e_aᵀ U⁻ᵀ."""
-    U, inverse, before = f.U, f.inverse, f.before
+def unit_row(inertia, a, weight, x):
+    """Fill x (n,) with the whitened row of a joint: weight · e_aᵀ U⁻ᵀ."""
+    U, inverse, before = inertia.U, inertia.inverse, inertia.before
     for b in range(x.shape[0]):
         x[b] = 0.0
     x[a] = weight * inverse[a]
@@ -120,9 +82,9 @@ def unit_row(f, a, weight, x):
 
 
 @jit
-def acceleration_of(f, x):
-    """Overwrite a whitened torque with the acceleration U⁻ᵀ x that it causes."""
-    U, inverse, end = f.U, f.inverse, f.end
+def acceleration_of(inertia, x):
+    """Overwrite a whitened torque (n,) [√J/s] with the acceleration U⁻ᵀ x [rad/s²] that it causes."""
+    U, inverse, end = inertia.U, inertia.inverse, inertia.end
     for a in range(U.shape[0]):
         x[a] *= inverse[a]
         for k in range(a + 1, end[a]):
@@ -130,9 +92,9 @@ def acceleration_of(f, x):
 
 
 @jit
-def whitened_of(f, x, out):
-    """Fill out with the whitened torque Uᵀ x of an acceleration."""
-    U, end = f.U, f.end
+def whitened_of(inertia, x, out):
+    """Fill out (n,) with the whitened torque Uᵀ x [√J/s] of an acceleration [rad/s²]."""
+    U, end = inertia.U, inertia.end
     for a in range(U.shape[0]):
         out[a] = 0.0
     for a in range(U.shape[0]):
@@ -141,9 +103,9 @@ def whitened_of(f, x, out):
 
 
 @jit
-def torque_of(f, x, out):
-    """Fill out with the torque U x of a whitened one."""
-    U, end = f.U, f.end
+def torque_of(inertia, x, out):
+    """Fill out (n,) with the torque U x [N·m] of a whitened one [√J/s]."""
+    U, end = inertia.U, inertia.end
     for a in range(U.shape[0]):
         s = 0.0
         for k in range(a, end[a]):

@@ -29,19 +29,19 @@ lose four."""
 
 
 @jit
-def project(d, count, n, J, f, s):
-    """Put the rows ``s.rows[:count]`` before depth ``d``: B = Ĵ Z and the residual f − Ĵ û.
+def project(d, count, n, J, f, space):
+    """Put the rows ``space.rows[:count]`` before depth ``d``: B = Ĵ Z and the residual f − Ĵ û.
 
     Args:
-        d: Depth of the levels above in the arrays of ``s``.
+        d: Depth of the levels above in the arrays of ``space``.
         count: Number of rows m.
         n: Number of joints.
-        J: Whitened rows of every task set.
-        f: Their desired values.
-        s: The memory.
+        J: (rows, n) whitened rows of every task set.
+        f: (rows,) their desired values, √J/s.
+        space: `SPACE`; Z, u, free are read, B (count, free) and residual (count,) written.
     """
-    Z, u, B, rows, residual = s.Z[d], s.u[d], s.B, s.rows, s.residual
-    r = s.free[d]
+    Z, u, B, rows, residual = space.Z[d], space.u[d], space.B, space.rows, space.residual
+    r = space.free[d]
     for i in range(count):
         row, into = J[rows[i]], B[i]
         done = 0.0
@@ -60,53 +60,54 @@ def project(d, count, n, J, f, s):
 
 
 @jit
-def solve_level(d, count, n, J, last, buffer, s):
+def solve_level(d, count, n, J, last, buffer, space):
     """Solve the rows that `project` has put before what depth ``d`` has decided.
 
     û_l = û_{l−1} + (Ĵ_l N_{l−1})⁺ (f_l − Ĵ_l û_{l−1}), for every alternative i: the i strongest
     directions of JN JNᵀ = U Σ Uᵀ (Eq. 25), with weight h(σ_i) − h(σ_{i+1}).
 
     Args:
-        d: Depth of the levels above in the arrays of ``s``.
+        d: Depth of the levels above in the arrays of ``space``.
         count: Number of rows m.
         n: Number of joints.
-        J: Whitened rows of every task set.
+        J: (rows, n) whitened rows of every task set.
         last: Whether nothing is below, so that what is left free does not matter.
         buffer: (on, lower, upper, profile); without ``on`` only exact dependence is removed.
-        s: The memory.
+        space: `SPACE`; B and residual are read, u, Z, free of depth d + 1 written, or for a level
+            that branches V, strength, share.
 
     Returns:
         Number of alternatives; 1 stands for a result that is already at depth d + 1.
     """
-    r = s.free[d]
-    bound = _bound(count, n, J, buffer, s.rows)
-    used = _use_columns(count, r, s)
+    r = space.free[d]
+    bound = _bound(count, n, J, buffer, space.rows)
+    used = _use_columns(count, r, space)
     if r <= count:
-        if _solve_tall(d, count, n, r, bound, s):
+        if _solve_tall(d, count, n, r, bound, space):
             return 1
-        _singular_tall(count, r, s)
+        _singular_tall(count, r, space)
         rank = r
     else:
-        if count == 1 and _solve_row(d, n, used, last, bound, s):
+        if count == 1 and _solve_row(d, n, used, last, bound, space):
             return 1
-        if _solve_wide(d, count, n, used, last, bound, s):
+        if _solve_wide(d, count, n, used, last, bound, space):
             return 1
-        _singular_wide(count, s)
+        _singular_wide(count, space)
         rank = count
     threshold = 0.0
     if buffer[0] == 0.0:
-        threshold = RANK_TOLERANCE * _largest(count, n, J, s)
-    return _alternatives(d, count, n, used, rank, threshold, buffer, s)
+        threshold = RANK_TOLERANCE * _largest(count, n, J, space)
+    return _alternatives(d, count, n, used, rank, threshold, buffer, space)
 
 
 @jit
-def _use_columns(m, r, s):
+def _use_columns(m, r, space):
     """Leave out the free motions that no row moves, where enough are left: columns of zeros in B.
 
     Returns:
-        How many are left; ``s.column`` lists them, then the others.
+        How many are left; ``space.column`` lists them, then the others.
     """
-    B, column, size = s.B, s.column, s.x
+    B, column, size = space.B, space.column, space.x
     for b in range(r):
         size[b] = 0.0
     for i in range(m):
@@ -146,9 +147,9 @@ def _bound(count, n, J, buffer, rows):
 
 
 @jit
-def _solve_row(d, n, used, last, bound, s):
+def _solve_row(d, n, used, last, bound, space):
     """One row: a step along it; the others are turned by the reflector that makes it the first."""
-    row, column, Z, left, along = s.B[0], s.column, s.Z[d], s.Z[d + 1], s.y
+    row, column, Z, left, along = space.B[0], space.column, space.Z[d], space.Z[d + 1], space.y
     size = 0.0
     for c in range(used):
         size += row[c] * row[c]
@@ -160,11 +161,11 @@ def _solve_row(d, n, used, last, bound, s):
         factor, vector = row[c], Z[column[c]]
         for a in range(n):
             along[a] += factor * vector[a]
-    factor = s.residual[0] / size
+    factor = space.residual[0] / size
     for a in range(n):
-        s.u[d + 1, a] = s.u[d, a] + factor * along[a]
-    r = s.free[d]
-    s.free[d + 1] = r - 1
+        space.u[d + 1, a] = space.u[d, a] + factor * along[a]
+    r = space.free[d]
+    space.free[d + 1] = r - 1
     if last:
         return True
     norm = math.sqrt(size)
@@ -183,38 +184,38 @@ def _solve_row(d, n, used, last, bound, s):
 
 
 @jit
-def _solve_wide(d, m, n, used, last, bound, s):
+def _solve_wide(d, m, n, used, last, bound, space):
     """Rows that are all active: x = Q R⁻ᵀ residual; what is left free is the rest of Q."""
-    B, R, x, scale, residual = s.B, s.R, s.x, s.scale, s.residual
+    B, R, x, scale, residual = space.B, space.R, space.x, space.scale, space.residual
     householder(B, m, used, scale, R)
-    if not _regular(R, m, bound, s):
+    if not _regular(R, m, bound, space):
         return False
     for i in range(m):
         x[i] = residual[i]
     solve_upper_transposed(R, m, x)
-    r = s.free[d]
-    s.free[d + 1] = r - m
+    r = space.free[d]
+    space.free[d + 1] = r - m
     if used < r or (not last and r - m > m):
-        _turn_basis(d, m, n, used, r, s)
+        _turn_basis(d, m, n, used, r, space)
         return True
     for i in range(m, r):
         x[i] = 0.0
     apply_reflectors(B, m, r, scale, x)
     if r == n:  # the basis is the identity
         for a in range(n):
-            s.u[d + 1, a] = s.u[d, a] + x[a]
+            space.u[d + 1, a] = space.u[d, a] + x[a]
     else:
-        _step(n, r, s.Z[d], x, s.u[d], s.u[d + 1])
+        _step(n, r, space.Z[d], x, space.u[d], space.u[d + 1])
     if not last:
         for j in range(m, r):
-            _complement(d, m, n, r, j, x, s, s.Z[d + 1, j - m])
+            _complement(d, m, n, r, j, x, space, space.Z[d + 1, j - m])
     return True
 
 
 @jit
-def _regular(R, m, bound, s):
+def _regular(R, m, bound, space):
     """Whether all eigenvalues of RᵀR are above a bound."""
-    G = s.G
+    G = space.G
     for i in range(m):
         for j in range(i + 1):
             G[i, j] = 0.0
@@ -223,20 +224,20 @@ def _regular(R, m, bound, s):
             factor = R[k, i]
             for j in range(k, i + 1):
                 G[i, j] += factor * R[k, j]
-    return cholesky(G, m, bound, s.Y)
+    return cholesky(G, m, bound, space.Y)
 
 
 @jit
-def _turn_basis(d, m, n, used, r, s):
+def _turn_basis(d, m, n, used, r, space):
     """Step along the first m vectors of the basis turned by Qᵀ; the others are what is left free.
 
     The same as column by column, and cheaper where many are left.
     """
-    turned, column, Z, left = s.V[d], s.column, s.Z[d], s.Z[d + 1]
+    turned, column, Z, left = space.V[d], space.column, space.Z[d], space.Z[d + 1]
     for c in range(used):
         _copy(n, Z[column[c]], turned[c])
-    _turn(m, n, used, s.B, s.scale, turned, s.y)
-    _step(n, m, turned, s.x, s.u[d], s.u[d + 1])
+    _turn(m, n, used, space.B, space.scale, turned, space.y)
+    _step(n, m, turned, space.x, space.u[d], space.u[d + 1])
     for c in range(m, used):
         _copy(n, turned[c], left[c - m])
     for c in range(used, r):
@@ -266,38 +267,38 @@ def _turn(m, n, r, B, scale, turned, w):
 
 
 @jit
-def _solve_tall(d, m, n, r, bound, s):
+def _solve_tall(d, m, n, r, bound, space):
     """At least as many rows as free motions, all of them used: least squares, nothing is left free."""
-    B, C, x, residual = s.B, s.C, s.x, s.residual
+    B, C, x, residual = space.B, space.C, space.x, space.residual
     size = 0.0
     for b in range(r):
         for i in range(m):
             C[b, i] = B[i, b]
             size += C[b, i] * C[b, i]
     enough = NORMAL * size
-    if not _solve_normal(m, r, max(bound, enough), s):
+    if not _solve_normal(m, r, max(bound, enough), space):
         if bound >= enough:
             return False
-        householder(C, r, m, s.scale, s.R)
-        if not _regular(s.R, r, bound, s):
+        householder(C, r, m, space.scale, space.R)
+        if not _regular(space.R, r, bound, space):
             return False
         for i in range(m):
             x[i] = residual[i]
-        apply_reflectors_transposed(C, r, m, s.scale, x)
-        solve_upper(s.R, r, x)
-    _step(n, r, s.Z[d], x, s.u[d], s.u[d + 1])
-    s.free[d + 1] = 0
+        apply_reflectors_transposed(C, r, m, space.scale, x)
+        solve_upper(space.R, r, x)
+    _step(n, r, space.Z[d], x, space.u[d], space.u[d + 1])
+    space.free[d + 1] = 0
     return True
 
 
 @jit
-def _solve_normal(m, r, bound, s):
+def _solve_normal(m, r, bound, space):
     """Solve BᵀB x = Bᵀ residual, at a third of the cost of an orthogonal factorisation.
 
     Returns:
         Whether all eigenvalues of BᵀB are above the bound; otherwise there is no x.
     """
-    C, G, L, x, residual = s.C, s.G, s.R, s.x, s.residual
+    C, G, L, x, residual = space.C, space.G, space.R, space.x, space.residual
     for a in range(r):
         for b in range(a + 1):
             total = 0.0
@@ -329,13 +330,13 @@ def _step(n, count, vectors, x, before, after):
 
 
 @jit
-def _complement(d, m, n, used, j, x, s, vector):
+def _complement(d, m, n, used, j, x, space, vector):
     """Column j of Q, in joint coordinates."""
     for b in range(used):
         x[b] = 0.0
     x[j] = 1.0
-    apply_reflectors(s.B, m, used, s.scale, x)
-    _combine(n, used, s.free[d], s.Z[d], s.column, x, vector)
+    apply_reflectors(space.B, m, used, space.scale, x)
+    _combine(n, used, space.free[d], space.Z[d], space.column, x, vector)
 
 
 @jit
@@ -354,28 +355,28 @@ def _combine(n, used, r, Z, column, x, vector):
 
 
 @jit
-def _singular_wide(m, s):
+def _singular_wide(m, space):
     """Singular values of Rᵀ, hence of the level; C gets σ_i u_i as rows."""
-    C, R = s.C, s.R
+    C, R = space.C, space.R
     for i in range(m):
         for j in range(m):
             C[i, j] = R[i, j] if j >= i else 0.0
-    singular_values(C, m, m, s.Y, s.sigma)
+    singular_values(C, m, m, space.Y, space.sigma)
 
 
 @jit
-def _singular_tall(m, r, s):
-    B, C = s.B, s.C
+def _singular_tall(m, r, space):
+    B, C = space.B, space.C
     for b in range(r):
         for i in range(m):
             C[b, i] = B[i, b]
-    singular_values(C, r, m, s.Y, s.sigma)
+    singular_values(C, r, m, space.Y, space.sigma)
 
 
 @jit
-def _largest(count, n, J, s):
+def _largest(count, n, J, space):
     """‖J‖₂ of the rows before projection, by power iteration on J Jᵀ."""
-    x, y, rows, z = s.x, s.y, s.rows, s.G[0]
+    x, y, rows, z = space.x, space.y, space.rows, space.G[0]
     for i in range(count):
         y[i] = 1.0 + 0.1 * i
     norm = 0.0
@@ -402,10 +403,16 @@ def _largest(count, n, J, s):
 
 
 @jit
-def _alternatives(d, m, n, used, rank, threshold, buffer, s):
+def _alternatives(d, m, n, used, rank, threshold, buffer, space):
     """Directions, what each adds, and the weights of the chain; the i strongest are alternative i."""
-    _directions(d, m, n, used, rank, s)
-    sigma, strength, share, C, residual = s.sigma, s.strength, s.share, s.C, s.residual
+    _directions(d, m, n, used, rank, space)
+    sigma, strength, share, C, residual = (
+        space.sigma,
+        space.strength,
+        space.share,
+        space.C,
+        space.residual,
+    )
     before = 1.0
     faded = 0
     for i in range(rank):
@@ -425,15 +432,23 @@ def _alternatives(d, m, n, used, rank, threshold, buffer, s):
         share[d, i] = before - h
         before = h
     share[d, rank] = before
-    s.faded[0] = faded
+    space.faded[0] = faded
     return rank + 1
 
 
 @jit
-def _directions(d, m, n, used, rank, s):
+def _directions(d, m, n, used, rank, space):
     """V: right singular vectors in joint coordinates, then an orthonormal basis of the rest."""
-    B, Y, Z, V, x, scale, column = s.B, s.Y, s.Z[d], s.V[d], s.x, s.scale, s.column
-    r = s.free[d]
+    B, Y, Z, V, x, scale, column = (
+        space.B,
+        space.Y,
+        space.Z[d],
+        space.V[d],
+        space.x,
+        space.scale,
+        space.column,
+    )
+    r = space.free[d]
     for i in range(rank):
         for b in range(used):
             x[b] = Y[i, b] if b < rank else 0.0
@@ -441,19 +456,25 @@ def _directions(d, m, n, used, rank, s):
             apply_reflectors(B, m, used, scale, x)
         _combine(n, used, r, Z, column, x, V[i])
     for j in range(rank, used):
-        _complement(d, m, n, used, j, x, s, V[j])
+        _complement(d, m, n, used, j, x, space, V[j])
     for j in range(used, r):
         _copy(n, Z[column[j]], V[j])
 
 
 @jit
-def take_alternative(d, i, n, s):
+def take_alternative(d, i, n, space):
     """Put the alternative with the ``i`` strongest directions at depth d + 1."""
-    V, strength, before, after, left = s.V[d], s.strength[d], s.u[d], s.u[d + 1], s.Z[d + 1]
-    r = s.free[d]
-    s.free[d + 1] = r - i
+    V, strength, before, after, left = (
+        space.V[d],
+        space.strength[d],
+        space.u[d],
+        space.u[d + 1],
+        space.Z[d + 1],
+    )
+    r = space.free[d]
+    space.free[d + 1] = r - i
     if i == 0:
-        V = s.Z[d]  # as it was, so that the identity stays one
+        V = space.Z[d]  # as it was, so that the identity stays one
     for a in range(n):
         total = before[a]
         for k in range(i):

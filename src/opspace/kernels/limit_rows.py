@@ -24,23 +24,23 @@ from opspace.machine.jit import jit
 FILTERED = int(Status.FILTERED)
 LIMIT_LOST = int(Status.LIMIT_LOST)
 
-# Columns of Tick.limit.
+# Columns of Tick.limit: side, rad, rad/s², rad/s², rad/s², rad/s, rad/s².
 SIGN, POSITION, BRAKE, MARGIN, COMMAND, SPEED, DISTURBANCE = range(7)
 
 
 @jit
-def begin_limits(k):
-    """Evaluate what every limit asks for; nothing is known yet about how much it takes part."""
-    option = k.option
-    for i in range(k.limit.shape[0]):
-        limit = k.limit[i]
-        j = k.limit_joint[i]
-        k.limit_h[i] = 0.0
-        k.limit_wanted[i] = -math.inf
+def begin_limits(work):
+    """Evaluate what every limit asks for, rad/s², into its row of ``limit`` (limits, 7)."""
+    option = work.option
+    for i in range(work.limit.shape[0]):
+        limit = work.limit[i]
+        j = work.limit_joint[i]
+        work.limit_h[i] = 0.0
+        work.limit_wanted[i] = -math.inf
         limit[COMMAND] = limit_command(
             int(option[LIMIT_LAW]),
-            limit[SIGN] * (limit[POSITION] - k.q[j]),
-            limit[SIGN] * k.v[j],
+            limit[SIGN] * (limit[POSITION] - work.q[j]),
+            limit[SIGN] * work.v[j],
             limit[BRAKE],
             limit[SPEED],
             option[LIMIT_K1],
@@ -52,89 +52,93 @@ def begin_limits(k):
 
 
 @jit
-def insert_limits(k):
+def insert_limits(work):
     """Find which limits take part for the accelerations found, at least as much as before.
+
+    Reads joint_acceleration (n,) and limit; writes limit_h and limit_wanted (limits,), rad/s².
 
     Returns:
         Whether anything changed.
     """
     changed = False
-    option = k.option
-    for i in range(k.limit.shape[0]):
-        limit = k.limit[i]
-        j = k.limit_joint[i]
+    option = work.option
+    for i in range(work.limit.shape[0]):
+        limit = work.limit[i]
+        j = work.limit_joint[i]
         h, wanted = limit_presence(
             int(option[LIMIT_LAW]),
-            limit[SIGN] * (limit[POSITION] - k.q[j]),
-            limit[SIGN] * k.v[j],
+            limit[SIGN] * (limit[POSITION] - work.q[j]),
+            limit[SIGN] * work.v[j],
             limit[BRAKE],
             option[LIMIT_BUFFER],
-            limit[SIGN] * k.joint_acceleration[j],
+            limit[SIGN] * work.joint_acceleration[j],
             limit[COMMAND],
             limit[MARGIN],
             int(option[LIMIT_PROFILE]),
         )
-        h, wanted = max(h, k.limit_h[i]), max(wanted, k.limit_wanted[i])
+        h, wanted = max(h, work.limit_h[i]), max(wanted, work.limit_wanted[i])
         if h <= 0.0:
             continue
-        if rises(h, k.limit_h[i]) or rises(wanted, k.limit_wanted[i]):
+        if rises(h, work.limit_h[i]) or rises(wanted, work.limit_wanted[i]):
             changed = True
-            k.limit_h[i], k.limit_wanted[i] = h, wanted
+            work.limit_h[i], work.limit_wanted[i] = h, wanted
     return changed
 
 
 @jit
-def keep_bounds(k):
+def keep_bounds(work):
     """Replace the torque by the nearest one with which no joint accelerates more than it may.
+
+    Reads and writes tau (n,), N·m, and joint_acceleration (n,), rad/s².
 
     Returns:
         What happened, in the numbers of `opspace.Status`.
     """
-    if k.option[LIMIT_BOUND] == 0.0:
+    if work.option[LIMIT_BOUND] == 0.0:
         return 0
-    n = k.v.shape[0]
-    x = k.joint_acceleration
+    n = work.v.shape[0]
+    x = work.joint_acceleration
     for a in range(n):
-        x[a] = k.tau[a] - k.bias[a]
-    whiten(k.inertia, x)
-    acceleration_of(k.inertia, x)
-    if not _excess(k) > BROKEN:
+        x[a] = work.tau[a] - work.bias[a]
+    whiten(work.inertia, x)
+    acceleration_of(work.inertia, x)
+    if not _excess(work) > BROKEN:
         return 0
-    _bounds(k, n)
-    nearest_acceleration(k.inertia, x, k.bounds)
+    _bounds(work, n)
+    nearest_acceleration(work.inertia, x, work.bounds)
     for a in range(n):
-        k.tau[a] = k.bias[a]
+        work.tau[a] = work.bias[a]
         for b in range(n):
-            k.tau[a] += k.M[a, b] * x[b]
-        if k.option[KEEP_TORQUE] != 0.0:
-            k.tau[a] = min(max(k.tau[a], -k.torque_limit[a]), k.torque_limit[a])
-    return FILTERED | LIMIT_LOST if _excess(k) > LOST else FILTERED
+            work.tau[a] += work.M[a, b] * x[b]
+        if work.option[KEEP_TORQUE] != 0.0:
+            work.tau[a] = min(max(work.tau[a], -work.torque_limit[a]), work.torque_limit[a])
+    return FILTERED | LIMIT_LOST if _excess(work) > LOST else FILTERED
 
 
 @jit
-def _excess(k):
+def _excess(work):
     """The largest excess over what a joint may do, see `opspace.law.excess`."""
     most = -math.inf
-    for i in range(k.limit.shape[0]):
-        limit = k.limit[i]
-        over = limit[SIGN] * k.joint_acceleration[k.limit_joint[i]] - limit[COMMAND]
+    for i in range(work.limit.shape[0]):
+        limit = work.limit[i]
+        over = limit[SIGN] * work.joint_acceleration[work.limit_joint[i]] - limit[COMMAND]
         most = max(most, over / max(1.0, abs(limit[COMMAND])))
     return most
 
 
 @jit
-def _bounds(k, n):
+def _bounds(work, n):
     """Least and largest acceleration, and torque beside the bias, of every joint."""
-    b = k.bounds
+    bounds = work.bounds
     for a in range(n):
-        b.lower[a], b.upper[a] = -math.inf, math.inf
-        b.least[a], b.most[a] = -math.inf, math.inf
-        if k.option[KEEP_TORQUE] != 0.0:
-            b.least[a] = -k.torque_limit[a] - k.bias[a]
-            b.most[a] = k.torque_limit[a] - k.bias[a]
-    for i in range(k.limit.shape[0]):
-        limit, j = k.limit[i], k.limit_joint[i]
+        bounds.lower[a], bounds.upper[a] = -math.inf, math.inf
+        bounds.least[a], bounds.most[a] = -math.inf, math.inf
+        if work.option[KEEP_TORQUE] != 0.0:
+            bounds.least[a] = -work.torque_limit[a] - work.bias[a]
+            bounds.most[a] = work.torque_limit[a] - work.bias[a]
+    for i in range(work.limit.shape[0]):
+        limit, j = work.limit[i], work.limit_joint[i]
         if limit[SIGN] > 0.0:
-            b.upper[j] = limit[COMMAND]
+            bounds.upper[j] = limit[COMMAND]
         else:
-            b.lower[j] = -limit[COMMAND]
+            bounds.lower[j] = -limit[COMMAND]

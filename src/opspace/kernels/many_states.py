@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from functools import partial
-from typing import NamedTuple
 
 import numpy as np
 
@@ -15,63 +14,49 @@ from opspace.machine.jit import jit
 LARGEST = float(np.finfo(float).max)
 
 
-class Remembered(NamedTuple):
-    """What a tick takes over from the one before, the same for every state of a batch.
-
-    Attributes:
-        group: (variables,) how each activation is blended.
-        remembers: (tasks,) whether it is known which way round a rotation went.
-        turn: (tasks, 4) that rotation, quaternion wxyz.
-    """
-
-    group: np.ndarray
-    remembers: np.ndarray
-    turn: np.ndarray
-
-
 @partial(jit, nogil=True)
-def ticks(t, k, before, Q, V, own, first, end, tau):
+def ticks(t, work, before, Q, V, own, first, end, tau):
     """Compute the torque at the states ``first`` to ``end`` − 1, each as the tick after ``before``.
 
     Args:
         t: Time, s.
-        k: Handle of a `opspace.kernels.columns.Tick` that computes the robot itself.
-        before: Handle of `Remembered`.
-        Q: (states, n) configurations.
-        V: (states, n) velocities.
+        work: `TICK` of a robot that it computes itself.
+        before: `REMEMBERED`.
+        Q: (states, nq) configurations, rad or m.
+        V: (states, n) velocities, rad/s or m/s.
         own: (states, tasks) activation of each task by its own function, or one row for all.
         first: First state.
         end: State after the last one.
         tau: (states, n) filled, N·m.
     """
-    n = k.v.shape[0]
+    n = work.v.shape[0]
     for i in range(first, end):
         for a in range(n):
-            k.q[a], k.v[a] = Q[i, a], V[i, a]
-        begin_state(k, before, own[i if own.shape[0] > 1 else 0])
-        if tick(t, k) < 0:
-            brake(k, tau[i])
+            work.q[a], work.v[a] = Q[i, a], V[i, a]
+        begin_state(work, before, own[i if own.shape[0] > 1 else 0])
+        if tick(t, work) < 0:
+            brake(work, tau[i])
         else:
             for a in range(n):
-                tau[i, a] = k.tau[a]
+                tau[i, a] = work.tau[a]
 
 
 @jit
-def begin_state(k, before, own):
+def begin_state(work, before, own):
     """Go back to what the tick before knew."""
     for i in range(before.group.shape[0]):
-        k.group[i] = before.group[i]
+        work.group[i] = before.group[i]
     for i in range(before.remembers.shape[0]):
-        k.own[i] = own[i]
-        k.kind[i, REMEMBERS] = before.remembers[i]
+        work.own[i] = own[i]
+        work.kind[i, REMEMBERS] = before.remembers[i]
         for c in range(4):
-            k.numbers[i, TURN + c] = before.turn[i, c]
+            work.numbers[i, TURN + c] = before.turn[i, c]
 
 
 @jit
-def brake(k, tau):
-    """Bias with joint damping, inside the motors' limits; finite whatever the model says."""
+def brake(work, tau):
+    """Bias with joint damping (n,), N·m, inside the motors' limits; finite whatever the model says."""
     for a in range(tau.shape[0]):
-        x = k.bias[a] - k.option[DAMPING] * k.M[a, a] * k.v[a]
-        limit = min(k.torque_limit[a], LARGEST)
+        x = work.bias[a] - work.option[DAMPING] * work.M[a, a] * work.v[a]
+        limit = min(work.torque_limit[a], LARGEST)
         tau[a] = 0.0 if math.isnan(x) else min(max(x, -limit), limit)

@@ -29,15 +29,15 @@ def cross_add(out, i, ax, ay, az, bx, by, bz):
 
 
 @jit
-def move_joints(k):
-    """Velocity and drift of the body behind every joint, seen at the origin of the world.
+def move_joints(work):
+    """Velocity and drift (n, 6) of the body behind every joint, seen at the origin of the world.
 
     V_j = V_parent + s_j v_j,  A_j = A_parent + (V_j × s_j) v_j: an axis s_j moves with its body.
     """
-    axes, velocity, acceleration = k.axes, k.velocity, k.acceleration
-    for j in range(k.v.shape[0]):
-        p = k.parent[j]
-        rate = k.v[j]
+    axes, velocity, acceleration = work.axes, work.velocity, work.acceleration
+    for j in range(work.v.shape[0]):
+        p = work.parent[j]
+        rate = work.v[j]
         for i in range(6):
             velocity[j, i] = axes[j, i] * rate
             acceleration[j, i] = 0.0
@@ -57,37 +57,37 @@ def move_joints(k):
 
 
 @jit
-def place_frame(k, i, m, body, joint, local, offset):
-    """Motion of a frame of task i into row m of ``motion``: x, ẋ = J v and J̇ v in world axes."""
-    x, number = k.motion[m], k.numbers[i]
+def place_frame(work, i, m, body, joint, local, offset):
+    """Motion of a frame of task i into row m of ``motion`` (3, 24): x, ẋ = J v, J̇ v in world axes."""
+    x, number = work.motion[m], work.numbers[i]
     for row in range(3):
         for column in range(3):
             total = number[local + 3 * column + row]
             if body >= 0:
                 total = 0.0
                 for c in range(3):
-                    total += k.placement[body, 3 * c + row] * number[local + 3 * column + c]
+                    total += work.placement[body, 3 * c + row] * number[local + 3 * column + c]
             x[R + 3 * row + column] = total
         total = number[local + 9 + row]
         if body >= 0:
-            total = k.placement[body, 9 + row]
+            total = work.placement[body, 9 + row]
             for c in range(3):
-                total += k.placement[body, 3 * c + row] * number[local + 9 + c]
+                total += work.placement[body, 3 * c + row] * number[local + 9 + c]
         x[P + row] = total
     if offset:
         for row in range(3):
             for c in range(3):
                 x[P + row] += x[R + 3 * row + c] * number[OFFSET + c]
-    _rates(k, m, joint, x)
-    _jacobian(k, m, joint, x)
+    _rates(work, m, joint, x)
+    _jacobian(work, m, joint, x)
 
 
 @jit
-def _rates(k, m, joint, x):
+def _rates(work, m, joint, x):
     """Velocity v_O + ω × p, and drift a_O + α × p + ω × velocity, of the point p of a body."""
     for i in range(6):
-        x[V + i] = k.velocity[joint, i] if joint >= 0 else 0.0
-        x[A + i] = k.acceleration[joint, i] if joint >= 0 else 0.0
+        x[V + i] = work.velocity[joint, i] if joint >= 0 else 0.0
+        x[A + i] = work.acceleration[joint, i] if joint >= 0 else 0.0
     px, py, pz = x[P], x[P + 1], x[P + 2]
     wx, wy, wz = x[V + 3], x[V + 4], x[V + 5]
     cross_add(x, V, wx, wy, wz, px, py, pz)
@@ -96,43 +96,46 @@ def _rates(k, m, joint, x):
 
 
 @jit
-def _jacobian(k, m, joint, x):
-    J = k.motion_J[m]
+def _jacobian(work, m, joint, x):
+    J = work.motion_J[m]
     for i in range(6):
-        for a in range(k.v.shape[0]):
+        for a in range(work.v.shape[0]):
             J[i, a] = 0.0
     px, py, pz = x[P], x[P + 1], x[P + 2]
     j = joint
     while j >= 0:
-        lx, ly, lz, wx, wy, wz = k.axes[j]
+        lx, ly, lz, wx, wy, wz = work.axes[j]
         J[0, j] = lx + wy * pz - wz * py
         J[1, j] = ly + wz * px - wx * pz
         J[2, j] = lz + wx * py - wy * px
         J[3, j] = wx
         J[4, j] = wy
         J[5, j] = wz
-        j = k.parent[j]
+        j = work.parent[j]
 
 
 @jit
-def measure(k, i):
-    """Motion that task i controls, into row 0 of ``motion`` (`opspace.tasks.motions`)."""
-    kind = k.kind[i]
+def measure(work, i):
+    """Motion that task i controls, into row 0 of ``motion``, with its Jacobian ``motion_J[0]`` (6, n).
+
+    `opspace.tasks.motions` has the readable form.
+    """
+    kind = work.kind[i]
     if kind[SOURCE] == CENTRE_OF_MASS:
-        _centre_of_mass(k)
+        _centre_of_mass(work)
         return
     if kind[SOURCE] != RELATIVE:
-        place_frame(k, i, 0, kind[BODY], kind[JOINT], LOCAL, True)
+        place_frame(work, i, 0, kind[BODY], kind[JOINT], LOCAL, True)
         return
-    place_frame(k, i, 1, kind[BODY], kind[JOINT], LOCAL, False)
-    place_frame(k, i, 2, kind[OTHER_BODY], kind[OTHER_JOINT], OTHER_LOCAL, False)
-    _relative(k)
+    place_frame(work, i, 1, kind[BODY], kind[JOINT], LOCAL, False)
+    place_frame(work, i, 2, kind[OTHER_BODY], kind[OTHER_JOINT], OTHER_LOCAL, False)
+    _relative(work)
 
 
 @jit
-def _relative(k):
+def _relative(work):
     """Row 1 seen from row 2, in the axes of row 2: see `opspace.tasks.motions.RelativeFrame`."""
-    out, f, r = k.motion[0], k.motion[1], k.motion[2]
+    out, f, r = work.motion[0], work.motion[1], work.motion[2]
     dx, dy, dz = f[P] - r[P], f[P + 1] - r[P + 1], f[P + 2] - r[P + 2]
     wx, wy, wz = r[V + 3], r[V + 4], r[V + 5]
     for i in range(6):
@@ -143,8 +146,8 @@ def _relative(k):
     cross_add(out, A, -r[A + 3], -r[A + 4], -r[A + 5], dx, dy, dz)
     cross_add(out, A, -wx, -wy, -wz, ux + out[V], uy + out[V + 1], uz + out[V + 2])
     cross_add(out, A + 3, -wx, -wy, -wz, f[V + 3], f[V + 4], f[V + 5])
-    J, Jf, Jr = k.motion_J[0], k.motion_J[1], k.motion_J[2]
-    for a in range(k.v.shape[0]):
+    J, Jf, Jr = work.motion_J[0], work.motion_J[1], work.motion_J[2]
+    for a in range(work.v.shape[0]):
         for i in range(6):
             J[i, a] = Jf[i, a] - Jr[i, a]
         J[0, a] -= Jr[4, a] * dz - Jr[5, a] * dy
@@ -172,10 +175,10 @@ def _turn_back(r, x, i):
 
 
 @jit
-def _centre_of_mass(k):
+def _centre_of_mass(work):
     """X = Σ mᵢ cᵢ / Σ mᵢ and its rates, linear rows only."""
-    out, J, part = k.motion[0], k.motion_J[0], k.motion[1]
-    n = k.v.shape[0]
+    out, J, part = work.motion[0], work.motion_J[0], work.motion[1]
+    n = work.v.shape[0]
     for i in range(out.shape[0]):
         out[i] = 0.0
     for i in range(3):
@@ -183,20 +186,20 @@ def _centre_of_mass(k):
         for a in range(n):
             J[i, a] = 0.0
     total = 0.0
-    for link in range(k.mass.shape[0]):
-        total += k.mass[link, 0]
-    for link in range(k.mass.shape[0]):
-        body, joint = k.mass_place[link, 0], k.mass_place[link, 1]
-        weight = k.mass[link, 0] / total
+    for link in range(work.mass.shape[0]):
+        total += work.mass[link, 0]
+    for link in range(work.mass.shape[0]):
+        body, joint = work.mass_place[link, 0], work.mass_place[link, 1]
+        weight = work.mass[link, 0] / total
         for row in range(3):
-            part[P + row] = k.placement[body, 9 + row]
+            part[P + row] = work.placement[body, 9 + row]
             for c in range(3):
-                part[P + row] += k.placement[body, 3 * c + row] * k.mass[link, 1 + c]
-        _rates(k, 1, joint, part)
-        _jacobian(k, 1, joint, part)
+                part[P + row] += work.placement[body, 3 * c + row] * work.mass[link, 1 + c]
+        _rates(work, 1, joint, part)
+        _jacobian(work, 1, joint, part)
         for i in range(3):
             out[P + i] += weight * part[P + i]
             out[V + i] += weight * part[V + i]
             out[A + i] += weight * part[A + i]
             for a in range(n):
-                J[i, a] += weight * k.motion_J[1, i, a]
+                J[i, a] += weight * work.motion_J[1, i, a]

@@ -3,110 +3,38 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
-
-import numpy as np
 
 from opspace.kernels.algebra import cholesky, solve_lower, solve_lower_transposed
 from opspace.kernels.inertia import acceleration_of, unit_row, whitened_of
 from opspace.law.scalars import HARD, SOFT, UNBOUNDED
 from opspace.machine.jit import jit
-from opspace.machine.record import Handle
 
 ROUNDING = 1e-13
 """A bound that is broken by less than this part of the numbers involved is kept."""
 
 
-class Bounds(NamedTuple):
-    """Bounds on accelerations and torques, and the memory to keep them.
-
-    Attributes:
-        lower: (n,) least accelerations, -inf where there is none.
-        upper: (n,) largest accelerations, inf where there is none.
-        least: (n,) least torques beside the bias, N·m.
-        most: (n,) largest torques beside the bias, N·m.
-        normal: (4n, n) every bound as unit normal · x <= bound, in x = Uᵀ q̈.
-        bound: (4n,) the bounds.
-        softness: (4n,) their softness.
-        multiplier: (4n,) multipliers of the bounds.
-        wanted: (4n,) multipliers of the bounds that hold, if they held alone.
-        active: (4n,) the bounds that hold.
-        x: (n,) the point that is projected.
-        y: (n,) its projection.
-        row: (n,) scratch.
-        r: (4n,) scratch.
-        G: (4n, 4n) scratch.
-        factor: (4n, 4n) scratch.
-    """
-
-    lower: np.ndarray
-    upper: np.ndarray
-    least: np.ndarray
-    most: np.ndarray
-    normal: np.ndarray
-    bound: np.ndarray
-    softness: np.ndarray
-    multiplier: np.ndarray
-    wanted: np.ndarray
-    active: np.ndarray
-    x: np.ndarray
-    y: np.ndarray
-    row: np.ndarray
-    r: np.ndarray
-    G: np.ndarray
-    factor: np.ndarray
-
-
-def make_bounds(n: int) -> Bounds:
-    """Make bounds for n joints, all infinite."""
-    m = 4 * n
-    return Bounds(
-        lower=np.full(n, -np.inf),
-        upper=np.full(n, np.inf),
-        least=np.full(n, -np.inf),
-        most=np.full(n, np.inf),
-        normal=np.zeros((m, n)),
-        bound=np.zeros(m),
-        softness=np.zeros(m),
-        multiplier=np.zeros(m),
-        wanted=np.zeros(m),
-        active=np.zeros(m, np.int64),
-        x=np.zeros(n),
-        y=np.zeros(n),
-        row=np.zeros(n),
-        r=np.zeros(m),
-        G=np.zeros((m, m)),
-        factor=np.zeros((m, m)),
-    )
-
-
-def bounds_handle(bounds: Bounds) -> Handle:
-    """Make the handle with which compiled functions reach `Bounds`."""
-    return Handle("Bounds", bounds._asdict())
-
-
 @jit
-def nearest_acceleration(f, acceleration, s):
+def nearest_acceleration(inertia, acceleration, bounds):
     """Overwrite an acceleration with the nearest one within bounds.
 
     The multipliers of the bounds are found by the active-set method of Lawson and Hanson.
 
     Args:
-        f: Handle of the inertia's factor.
-        acceleration: (n,) rad/s².
-        s: Handle of `Bounds`.
+        inertia: `INERTIA`, factored.
+        acceleration: (n,) rad/s², overwritten.
+        bounds: `BOUNDS`: lower and upper, rad/s², least and most, N·m, are read.
     """
     n = acceleration.shape[0]
-    count = _normals(f, n, s)
-    whitened_of(f, acceleration, s.x)
-    _project(count, n, s)
+    count = _normals(inertia, n, bounds)
+    whitened_of(inertia, acceleration, bounds.x)
+    _project(count, n, bounds)
     for a in range(n):
-        acceleration[a] = s.y[a]
-    acceleration_of(f, acceleration)
+        acceleration[a] = bounds.y[a]
+    acceleration_of(inertia, acceleration)
 
 
 @jit
-def _normals(f, n, s):
+def _normals(inertia, n, bounds):
     """Write every bound that is finite as unit normal · x <= bound, with its softness.
 
     Returns:
@@ -114,99 +42,101 @@ def _normals(f, n, s):
     """
     count = 0
     for j in range(n):
-        unit_row(f, j, 1.0, s.row)
-        count = _two_sided(count, n, s.lower[j], s.upper[j], SOFT, s)
+        unit_row(inertia, j, 1.0, bounds.row)
+        count = _two_sided(count, n, bounds.lower[j], bounds.upper[j], SOFT, bounds)
         for a in range(n):
-            s.row[a] = f.U[j, a]
-        count = _two_sided(count, n, s.least[j], s.most[j], HARD, s)
+            bounds.row[a] = inertia.U[j, a]
+        count = _two_sided(count, n, bounds.least[j], bounds.most[j], HARD, bounds)
     return count
 
 
 @jit
-def _two_sided(count, n, least, most, softness, s):
+def _two_sided(count, n, least, most, softness, bounds):
     size = 0.0
     for a in range(n):
-        size += s.row[a] * s.row[a]
+        size += bounds.row[a] * bounds.row[a]
     size = math.sqrt(size)
     for side in range(2):
         sign = 1.0 if side == 0 else -1.0
         limit = most if side == 0 else -least
         if limit < UNBOUNDED:
             for a in range(n):
-                s.normal[count, a] = sign * s.row[a] / size
-            s.bound[count], s.softness[count] = limit / size, softness
+                bounds.normal[count, a] = sign * bounds.row[a] / size
+            bounds.bound[count], bounds.softness[count] = limit / size, softness
             count += 1
     return count
 
 
 @jit
-def _project(count, n, s):
+def _project(count, n, bounds):
     """Y = x less the normals times their multipliers, none of which is negative."""
     for i in range(count):
-        s.multiplier[i] = 0.0
+        bounds.multiplier[i] = 0.0
     for a in range(n):
-        s.y[a] = s.x[a]
+        bounds.y[a] = bounds.x[a]
     size = 0
     for _ in range(10 * count):
-        worst = _most_broken(count, n, size, s)
+        worst = _most_broken(count, n, size, bounds)
         if worst < 0:
             break
-        s.active[size] = worst
+        bounds.active[size] = worst
         size += 1
         while size > 0:
-            _multipliers(n, size, s)
-            if _advance(size, s):
+            _multipliers(n, size, bounds)
+            if _advance(size, bounds):
                 break
-            size = _drop(size, s)
+            size = _drop(size, bounds)
         for a in range(n):
-            s.y[a] = s.x[a]
+            bounds.y[a] = bounds.x[a]
             for k in range(size):
-                s.y[a] -= s.normal[s.active[k], a] * s.multiplier[s.active[k]]
+                bounds.y[a] -= (
+                    bounds.normal[bounds.active[k], a] * bounds.multiplier[bounds.active[k]]
+                )
 
 
 @jit
-def _most_broken(count, n, size, s):
+def _most_broken(count, n, size, bounds):
     worst, most = -1, 0.0
     for i in range(count):
         known = False
         for k in range(size):
-            if s.active[k] == i:
+            if bounds.active[k] == i:
                 known = True
         if known:
             continue
-        over, scale = -s.bound[i], abs(s.bound[i])
+        over, scale = -bounds.bound[i], abs(bounds.bound[i])
         for a in range(n):
-            over += s.normal[i, a] * s.y[a]
-            scale += abs(s.normal[i, a] * s.x[a])
+            over += bounds.normal[i, a] * bounds.y[a]
+            scale += abs(bounds.normal[i, a] * bounds.x[a])
         if over > ROUNDING * scale and over > most:
             worst, most = i, over
     return worst
 
 
 @jit
-def _multipliers(n, size, s):
+def _multipliers(n, size, bounds):
     """Solve (N Nᵀ + softness) λ = N x − bound for the bounds that hold."""
     for k in range(size):
-        i = s.active[k]
+        i = bounds.active[k]
         for b in range(k + 1):
-            j = s.active[b]
+            j = bounds.active[b]
             product = 0.0
             for a in range(n):
-                product += s.normal[i, a] * s.normal[j, a]
-            s.G[k, b] = product
-        s.G[k, k] += s.softness[i]
-        s.r[k] = -s.bound[i]
+                product += bounds.normal[i, a] * bounds.normal[j, a]
+            bounds.G[k, b] = product
+        bounds.G[k, k] += bounds.softness[i]
+        bounds.r[k] = -bounds.bound[i]
         for a in range(n):
-            s.r[k] += s.normal[i, a] * s.x[a]
-    cholesky(s.G, size, 0.0, s.factor)
-    solve_lower(s.factor, size, s.r)
-    solve_lower_transposed(s.factor, size, s.r)
+            bounds.r[k] += bounds.normal[i, a] * bounds.x[a]
+    cholesky(bounds.G, size, 0.0, bounds.factor)
+    solve_lower(bounds.factor, size, bounds.r)
+    solve_lower_transposed(bounds.factor, size, bounds.r)
     for k in range(size):
-        s.wanted[s.active[k]] = s.r[k]
+        bounds.wanted[bounds.active[k]] = bounds.r[k]
 
 
 @jit
-def _advance(size, s):
+def _advance(size, bounds):
     """Move the multipliers towards what is wanted until one of them is zero.
 
     Returns:
@@ -214,22 +144,22 @@ def _advance(size, s):
     """
     share = 1.0
     for k in range(size):
-        i = s.active[k]
-        if s.wanted[i] <= 0.0:
-            way = s.multiplier[i] - s.wanted[i]
-            share = min(share, s.multiplier[i] / way if way > 0.0 else 0.0)
+        i = bounds.active[k]
+        if bounds.wanted[i] <= 0.0:
+            way = bounds.multiplier[i] - bounds.wanted[i]
+            share = min(share, bounds.multiplier[i] / way if way > 0.0 else 0.0)
     for k in range(size):
-        i = s.active[k]
-        gone = share * (s.multiplier[i] - s.wanted[i])
-        if s.wanted[i] <= 0.0 and gone >= s.multiplier[i] * (1.0 - ROUNDING):
-            s.multiplier[i] = 0.0
+        i = bounds.active[k]
+        gone = share * (bounds.multiplier[i] - bounds.wanted[i])
+        if bounds.wanted[i] <= 0.0 and gone >= bounds.multiplier[i] * (1.0 - ROUNDING):
+            bounds.multiplier[i] = 0.0
         else:
-            s.multiplier[i] -= gone
+            bounds.multiplier[i] -= gone
     return share == 1.0
 
 
 @jit
-def _drop(size, s):
+def _drop(size, bounds):
     """Forget the bounds whose multipliers have become zero.
 
     Returns:
@@ -237,7 +167,7 @@ def _drop(size, s):
     """
     kept = 0
     for k in range(size):
-        if s.multiplier[s.active[k]] > 0.0:
-            s.active[kept] = s.active[k]
+        if bounds.multiplier[bounds.active[k]] > 0.0:
+            bounds.active[kept] = bounds.active[k]
             kept += 1
     return kept

@@ -30,38 +30,40 @@ from opspace.machine.jit import jit
 
 
 @jit
-def evaluate_tasks(k):
-    """Fill J, drift, error and commanded acceleration of the rows of every built-in task."""
+def evaluate_tasks(work):
+    """Fill J (rows, n), drift, error and wanted (rows,), rad or m and s, of every built-in task."""
     moved = False
-    for i in range(k.kind.shape[0]):
-        if k.kind[i, KIND] == MOTION:
+    for i in range(work.kind.shape[0]):
+        if work.kind[i, KIND] == MOTION:
             if not moved:
-                move_joints(k)
+                move_joints(work)
                 moved = True
-            measure(k, i)
-            _motion_task(k, i)
-        elif k.kind[i, KIND] == JOINTS:
-            _joint_task(k, i)
+            measure(work, i)
+            _motion_task(work, i)
+        elif work.kind[i, KIND] == JOINTS:
+            _joint_task(work, i)
 
 
 @jit
-def _joint_task(k, i):
+def _joint_task(work, i):
     """f* = a_d + kv (v_d − v) + kp (q_d − q) of the chosen joints."""
-    first, rows = k.kind[i, FIRST_ROW], k.kind[i, ROWS]
+    first, rows = work.kind[i, FIRST_ROW], work.kind[i, ROWS]
     for row in range(first, first + rows):
-        k.error[row] = k.goal[row, 0] - k.q[k.coordinate[row]]
-        k.drift[row] = 0.0
+        work.error[row] = work.goal[row, 0] - work.q[work.coordinate[row]]
+        work.drift[row] = 0.0
     scale = 1.0
-    if k.kind[i, SPEED_LIMITED] != 0:
-        scale = _within_speed(k, first, first + rows, k.numbers[i, MAX_SPEED])
+    if work.kind[i, SPEED_LIMITED] != 0:
+        scale = _within_speed(work, first, first + rows, work.numbers[i, MAX_SPEED])
     for row in range(first, first + rows):
-        rate = k.goal[row, 1] - k.v[k.coordinate[row]]
-        k.wanted[row] = k.goal[row, 2] + k.kv[row] * rate + k.kp[row] * (k.error[row] * scale)
+        rate = work.goal[row, 1] - work.v[work.coordinate[row]]
+        work.wanted[row] = (
+            work.goal[row, 2] + work.kv[row] * rate + work.kp[row] * (work.error[row] * scale)
+        )
 
 
 @jit
-def _motion_task(k, i):
-    kind, number, x, e = k.kind[i], k.numbers[i], k.motion[0], k.motion_error
+def _motion_task(work, i):
+    kind, number, x, e = work.kind[i], work.numbers[i], work.motion[0], work.motion_error
     block, size = 0, 3
     if kind[QUANTITY] == ORIENTATION:
         block = 3
@@ -74,53 +76,53 @@ def _motion_task(k, i):
         _rotation_error(kind, number, x, e, size - 3)
     first, rows = kind[FIRST_ROW], kind[ROWS]
     for row in range(first, first + rows):
-        _project(k, i, row, block, size, x, e)
-    _accelerations(k, i, first, rows, size)
+        _project(work, i, row, block, size, x, e)
+    _accelerations(work, i, first, rows, size)
 
 
 @jit
-def _project(k, i, row, block, size, x, e):
+def _project(work, i, row, block, size, x, e):
     """One task row: the selected combination of the motion's rows, in world or tool axes."""
-    number = k.numbers[i]
-    for a in range(k.v.shape[0]):
-        k.J[row, a] = 0.0
+    number = work.numbers[i]
+    for a in range(work.v.shape[0]):
+        work.J[row, a] = 0.0
     error, drift, rate, ahead = 0.0, 0.0, 0.0, 0.0
     for c in range(size):
-        factor = k.select[row, c]
-        if k.kind[i, TOOL_AXES] != 0:
+        factor = work.select[row, c]
+        if work.kind[i, TOOL_AXES] != 0:
             # S Rᵀ: the selected axes of the tool, as combinations of those of the world.
             factor = 0.0
             base = 3 * (c // 3)
             for axis in range(3):
-                factor += k.select[row, base + axis] * x[R + 3 * (c - base) + axis]
+                factor += work.select[row, base + axis] * x[R + 3 * (c - base) + axis]
         if factor == 0.0:
             continue
         source = block + c
-        for a in range(k.v.shape[0]):
-            k.J[row, a] += factor * k.motion_J[0, source, a]
+        for a in range(work.v.shape[0]):
+            work.J[row, a] += factor * work.motion_J[0, source, a]
         # Tool axes turn with the tool, which takes ω × ẋ from the drift and from the desired
         # acceleration alike: it cancels in f* − J̇ q̇ and is left out of both.
         drift += factor * x[A + source]
         error += factor * e[c]
         rate += factor * (number[GOAL_VELOCITY + c] - x[V + source])
         ahead += factor * number[GOAL_ACCELERATION + c]
-    k.error[row] = error
-    k.drift[row] = drift
-    k.wanted[row] = ahead + k.kv[row] * rate
+    work.error[row] = error
+    work.drift[row] = drift
+    work.wanted[row] = ahead + work.kv[row] * rate
 
 
 @jit
-def _accelerations(k, i, first, rows, size):
+def _accelerations(work, i, first, rows, size):
     """Add kp (x_d − x), within the speed that it may ask for."""
-    limited = k.kind[i, SPEED_LIMITED] != 0
+    limited = work.kind[i, SPEED_LIMITED] != 0
     group = 3 if size == 6 else rows
     for start in range(first, first + rows, max(group, 1)):
         scale = 1.0
         if limited:
             which = (start - first) // group
-            scale = _within_speed(k, start, start + group, k.numbers[i, MAX_SPEED + which])
+            scale = _within_speed(work, start, start + group, work.numbers[i, MAX_SPEED + which])
         for row in range(start, start + group):
-            k.wanted[row] += k.kp[row] * (k.error[row] * scale)
+            work.wanted[row] += work.kp[row] * (work.error[row] * scale)
 
 
 @jit

@@ -55,43 +55,43 @@ SCALED = int(Status.TORQUE_SCALED)
 
 
 @jit
-def tick(t, k):
+def tick(t, work):
     """Compute the torque for the state that the robot's arrays hold.
 
     Args:
         t: Time, s.
-        k: Handle of a `opspace.kernels.columns.Tick`.
+        work: `opspace.plan.records.TICK`; tau (n,) N·m is written, and all that is reported.
 
     Returns:
-        One of the answers in ``layout``, negative; or what happened in the numbers of
-        `opspace.Status` plus ``layout.SOLVE`` times the number of hard torques.
+        One of the answers in `opspace.kernels.columns`, negative; or what happened in the numbers
+        of `opspace.Status` plus ``SOLVE`` times the number of hard torques.
     """
-    if not _finite(k.q) or not _finite(k.v):
+    if not _finite(work.q) or not _finite(work.v):
         return STATE_NOT_FINITE
-    if k.bodies.kind.shape[0] > 0:
-        evaluate(k.bodies, k.q, k.v, k.dynamics)
-    activations(t, k)
-    evaluate_tasks(k)
-    if not factor(k.M, k.inertia):
+    if work.bodies.kind.shape[0] > 0:
+        evaluate(work.bodies, work.q, work.v, work.dynamics)
+    activations(t, work)
+    evaluate_tasks(work)
+    if not factor(work.M, work.inertia):
         return NOT_POSITIVE_DEFINITE
-    stacks = blend(k)
-    whiten_tasks(k)
-    law(k, stacks, 0)
+    stacks = blend(work)
+    whiten_tasks(work)
+    law(work, stacks, 0)
     solves = stacks
-    if k.limit.shape[0] > 0:
-        begin_limits(k)
+    if work.limit.shape[0] > 0:
+        begin_limits(work)
         for _ in range(LIMIT_PASSES):
-            accelerations(k)
-            if not insert_limits(k):
+            accelerations(work)
+            if not insert_limits(work):
                 break
-            limit_stacks = limit_corners(k)
-            law(k, stacks, limit_stacks)
+            limit_stacks = limit_corners(work)
+            law(work, stacks, limit_stacks)
             solves = stacks * limit_stacks
-    torque(k)
-    kept = keep_bounds(k) if k.limit.shape[0] > 0 else 0
-    if not _finite(k.tau):
+    torque(work)
+    kept = keep_bounds(work) if work.limit.shape[0] > 0 else 0
+    if not _finite(work.tau):
         return NOT_FINITE
-    return (status(k) | kept) + SOLVE * solves
+    return (status(work) | kept) + SOLVE * solves
 
 
 @jit
@@ -103,186 +103,206 @@ def _finite(x):
 
 
 @jit
-def activations(t, k):
-    """Activation of every task and every change of place, and who belongs to which group."""
-    tasks = k.kind.shape[0]
-    for i in range(k.variable.shape[0]):
-        x = k.variable[i]
+def activations(t, work):
+    """Activation of every task and change of place at t [s], and who belongs to which group.
+
+    Reads variable and own, writes value (variables,), h (tasks,), group and chained (variables,).
+    """
+    tasks = work.kind.shape[0]
+    for i in range(work.variable.shape[0]):
+        x = work.variable[i]
         h = ramp(t, int(x[PROFILE]), x[1], x[2], x[3], x[4], x[5], x[6], x[7], x[8])
         if i < tasks:
-            h *= k.own[i]
-            k.h[i] = h
-        k.value[i] = h
+            h *= work.own[i]
+            work.h[i] = h
+        work.value[i] = h
     exact = 0
-    for i in range(k.value.shape[0]):
-        if not 0.0 < k.value[i] < 1.0:
-            k.group[i] = NO_GROUP
-        elif k.group[i] == EXACT:
+    for i in range(work.value.shape[0]):
+        if not 0.0 < work.value[i] < 1.0:
+            work.group[i] = NO_GROUP
+        elif work.group[i] == EXACT:
             exact += 1
-    for i in range(k.value.shape[0]):
-        if 0.0 < k.value[i] < 1.0 and k.group[i] == NO_GROUP:
-            if exact < k.option[ROOM]:
-                k.group[i] = EXACT
+    for i in range(work.value.shape[0]):
+        if 0.0 < work.value[i] < 1.0 and work.group[i] == NO_GROUP:
+            if exact < work.option[ROOM]:
+                work.group[i] = EXACT
                 exact += 1
             else:
-                k.group[i] = CHAINED
-        k.chained[i] = 1 if k.group[i] == CHAINED else 0
+                work.group[i] = CHAINED
+        work.chained[i] = 1 if work.group[i] == CHAINED else 0
 
 
 @jit
-def blend(k):
+def blend(work):
     """Hard stacks between which the tasks are on their way (`opspace.stack.mixture`).
+
+    Reads value and the slots, writes share (slots,), corner_on and corner_weight (2 corners,).
 
     Returns:
         Number of different stacks.
     """
-    slots = k.slots.shape[0]
-    count = corners(k.value, k.value.shape[0], k.chained, k.corner_on, k.corner_weight, k.order)
+    slots = work.slots.shape[0]
+    count = corners(
+        work.value,
+        work.value.shape[0],
+        work.chained,
+        work.corner_on,
+        work.corner_weight,
+        work.order,
+    )
     for s in range(slots):
-        k.share[s] = 0.0
+        work.share[s] = 0.0
     for c in range(count):
-        on = k.corner_on[c]
+        on = work.corner_on[c]
         mask = 0
         for s in range(slots):
-            if on & k.slot_off[s] != 0 or on & k.slot_place[s] != k.slot_place[s]:
+            if on & work.slot_off[s] != 0 or on & work.slot_place[s] != work.slot_place[s]:
                 continue
-            k.share[s] += k.corner_weight[c]
-            if on & k.slot_on[s] == k.slot_on[s]:
+            work.share[s] += work.corner_weight[c]
+            if on & work.slot_on[s] == work.slot_on[s]:
                 mask |= slot_bit(s)
-        k.corner_on[c] = mask
-    return sort_corners(k.corner_on, k.corner_weight, count)
+        work.corner_on[c] = mask
+    return sort_corners(work.corner_on, work.corner_weight, count)
 
 
 @jit
-def whiten_tasks(k):
-    """Rows Ĵ = W J U⁻ᵀ and f̂ = W f̃ of every task, and what damps the rest."""
-    n = k.v.shape[0]
-    if k.option[TASK_BIAS] != 0.0:
+def whiten_tasks(work):
+    """Rows Ĵ = W J U⁻ᵀ and f̂ = W f̃ of every task, and what damps the rest.
+
+    Reads J (rows, n), wanted and drift (rows,); writes Jw (rows, n), fw (rows,) [√J/s], rest (n + 1,).
+    """
+    n = work.v.shape[0]
+    if work.option[TASK_BIAS] != 0.0:
         # Eq. 3-4: f̃ = f* + η + ζ, the bias as an acceleration of each task.
         for a in range(n):
-            k.drop[a] = k.bias[a]
-        whiten(k.inertia, k.drop)
+            work.drop[a] = work.bias[a]
+        whiten(work.inertia, work.drop)
     covered = False
-    for i in range(k.kind.shape[0]):
-        whiten_task(k, i, n)
-        if k.kind[i, COVERS_ALL] != 0 and k.h[i] == 1.0:
+    for i in range(work.kind.shape[0]):
+        whiten_task(work, i, n)
+        if work.kind[i, COVERS_ALL] != 0 and work.h[i] == 1.0:
             covered = True
-    k.rest[n] = 0.0
-    if not covered and k.option[DAMPING] != 0.0:
-        damp_rest(k, n)
+    work.rest[n] = 0.0
+    if not covered and work.option[DAMPING] != 0.0:
+        damp_rest(work, n)
 
 
 @jit
-def whiten_task(k, i, n):
+def whiten_task(work, i, n):
     """Whiten the rows of task i."""
-    J, Jw, fw, weight = k.J, k.Jw, k.fw, k.row_weight
-    first = k.kind[i, FIRST_ROW]
-    end = first + k.kind[i, ROWS]
-    of_frame = k.kind[i, KIND] == MOTION and k.kind[i, SOURCE] == WORLD
+    J, Jw, fw, weight = work.J, work.Jw, work.fw, work.row_weight
+    first = work.kind[i, FIRST_ROW]
+    end = first + work.kind[i, ROWS]
+    of_frame = work.kind[i, KIND] == MOTION and work.kind[i, SOURCE] == WORLD
     for row in range(first, end):
-        if k.kind[i, KIND] == JOINTS:
-            unit_row(k.inertia, k.coordinate[row], weight[row], Jw[row])
+        if work.kind[i, KIND] == JOINTS:
+            unit_row(work.inertia, work.coordinate[row], weight[row], Jw[row])
             continue
         for a in range(n):
             Jw[row, a] = weight[row] * J[row, a]
         if not of_frame:
-            whiten(k.inertia, Jw[row])
+            whiten(work.inertia, Jw[row])
     if of_frame:
-        whiten_rows(k.inertia, k.kind[i, JOINT], first, end, Jw)
+        whiten_rows(work.inertia, work.kind[i, JOINT], first, end, Jw)
     for row in range(first, end):
-        fw[row] = weight[row] * (k.wanted[row] - k.drift[row])
-        if k.option[TASK_BIAS] != 0.0:
+        fw[row] = weight[row] * (work.wanted[row] - work.drift[row])
+        if work.option[TASK_BIAS] != 0.0:
             for a in range(n):
-                fw[row] += Jw[row, a] * k.drop[a]
+                fw[row] += Jw[row, a] * work.drop[a]
 
 
 @jit
-def damp_rest(k, n):
+def damp_rest(work, n):
     """q̈ = −d v of what is left, weighed by the inertia: its momentum decays at the rate d."""
-    k.rest[n] = 1.0
-    whitened_of(k.inertia, k.v, k.rest)
+    work.rest[n] = 1.0
+    whitened_of(work.inertia, work.v, work.rest)
     for a in range(n):
-        k.rest[a] *= -k.option[DAMPING]
-        if k.option[TASK_BIAS] != 0.0:
-            k.rest[a] += k.drop[a]
+        work.rest[a] *= -work.option[DAMPING]
+        if work.option[TASK_BIAS] != 0.0:
+            work.rest[a] += work.drop[a]
 
 
 @jit
-def law(k, stacks, limit_stacks):
-    """û = Σ_T w_T H(T; f̃) of the stacks, under the joint limits that take part (Eq. 19-23)."""
-    n = k.v.shape[0]
-    s = k.space
-    levels = s.u.shape[0] - 1
-    if k.option[KEEP_TORQUE] != 0.0:
-        start_inside(k, n)
+def law(work, stacks, limit_stacks):
+    """û = Σ_T w_T H(T; f̃) of the stacks, under the joint limits that take part (Eq. 19-23).
+
+    Reads Jw, fw, the corners and rest; writes u (n,), √J/s, and what `SPACE` keeps for the report.
+    """
+    n = work.v.shape[0]
+    space = work.space
+    levels = space.u.shape[0] - 1
+    if work.option[KEEP_TORQUE] != 0.0:
+        start_inside(work, n)
     for a in range(n):
-        k.u[a] = 0.0
-    begin(n, levels, s)
+        work.u[a] = 0.0
+    begin(n, levels, space)
     if limit_stacks == 0:
-        pass_on(0, n, s)
-        s.path[1] = 1.0
-        _walk(k, stacks, levels)
+        pass_on(0, n, space)
+        space.path[1] = 1.0
+        _walk(work, stacks, levels)
         return
     for c in range(limit_stacks):
-        _under_limits(k, c, stacks, levels)
+        _under_limits(work, c, stacks, levels)
 
 
 @jit
-def _walk(k, stacks, levels):
-    n = k.v.shape[0]
+def _walk(work, stacks, levels):
+    n = work.v.shape[0]
     walk(
-        1, levels, n, k.slots, k.Jw, k.fw, k.corner_on, k.corner_weight, stacks,
-        k.rest, k.option, k.space, k.u,
+        1, levels, n, work.slots, work.Jw, work.fw, work.corner_on, work.corner_weight, stacks,
+        work.rest, work.option, work.space, work.u,
     )  # fmt: skip
 
 
 @jit
-def _under_limits(k, c, stacks, levels):
+def _under_limits(work, c, stacks, levels):
     """Add the stacks below one corner of the joint limits."""
-    n = k.v.shape[0]
-    s = k.space
-    first = k.Jw.shape[0] - k.limit.shape[0]
+    n = work.v.shape[0]
+    space = work.space
+    first = work.Jw.shape[0] - work.limit.shape[0]
     count = 0
-    for i in range(k.limit.shape[0]):
-        if k.limit_on[c, i] != 0:
-            s.rows[count] = first + i
+    for i in range(work.limit.shape[0]):
+        if work.limit_on[c, i] != 0:
+            space.rows[count] = first + i
             count += 1
     if count == 0:
-        pass_on(0, n, s)
-        s.path[1] = k.limit_weight[c]
-        _walk(k, stacks, levels)
+        pass_on(0, n, space)
+        space.path[1] = work.limit_weight[c]
+        _walk(work, stacks, levels)
         return
-    project(0, count, n, k.Jw, k.fw, s)
-    alternatives = solve_level(0, count, n, k.Jw, False, k.option, s)
+    project(0, count, n, work.Jw, work.fw, space)
+    alternatives = solve_level(0, count, n, work.Jw, False, work.option, space)
     if alternatives == 1:
-        keep_inside(0, n, k.limit_weight[c], s)
+        keep_inside(0, n, work.limit_weight[c], space)
     for i in range(alternatives):
         share = 1.0
         if alternatives > 1:
-            share = s.share[0, i]
+            share = space.share[0, i]
             if share <= 0.0:
                 continue
-            take_alternative(0, i, n, s)
-            keep_inside(0, n, k.limit_weight[c] * share, s)
-        s.path[1] = k.limit_weight[c] * share
-        _walk(k, stacks, levels)
+            take_alternative(0, i, n, space)
+            keep_inside(0, n, work.limit_weight[c] * share, space)
+        space.path[1] = work.limit_weight[c] * share
+        _walk(work, stacks, levels)
 
 
 @jit
-def limit_corners(k):
+def limit_corners(work):
     """Rows of the joint limits that take part, and the corners of their chain.
+
+    Reads limit_h, limit_wanted [rad/s²]; writes limit_on (corners, limits), limit_weight (corners,).
 
     Returns:
         Number of corners.
     """
-    n, count = k.v.shape[0], k.limit.shape[0]
-    first = k.Jw.shape[0] - count
+    n, count = work.v.shape[0], work.limit.shape[0]
+    first = work.Jw.shape[0] - count
     links = 0
-    order, h, on, weight = k.limit_order, k.limit_h, k.limit_on, k.limit_weight
+    order, h, on, weight = work.limit_order, work.limit_h, work.limit_on, work.limit_weight
     for i in range(count):
         on[0, i] = 1 if h[i] >= 1.0 else 0
         if h[i] > 0.0:
-            limit_row(k, i, first + i, n)
+            limit_row(work, i, first + i, n)
             if h[i] < 1.0:
                 links = insert(i, h, order, links)
     total = 0
@@ -302,65 +322,65 @@ def limit_corners(k):
 
 
 @jit
-def limit_row(k, i, row, n):
+def limit_row(work, i, row, n):
     """Task set e_jᵀ q̈ = ± acceleration of a joint limit."""
-    weight = k.option[LIMIT_WEIGHT]
-    unit_row(k.inertia, k.limit_joint[i], weight, k.Jw[row])
-    k.fw[row] = weight * k.limit[i, SIGN] * k.limit_wanted[i]
-    if k.option[TASK_BIAS] != 0.0:
+    weight = work.option[LIMIT_WEIGHT]
+    unit_row(work.inertia, work.limit_joint[i], weight, work.Jw[row])
+    work.fw[row] = weight * work.limit[i, SIGN] * work.limit_wanted[i]
+    if work.option[TASK_BIAS] != 0.0:
         for a in range(n):
-            k.fw[row] += k.Jw[row, a] * k.drop[a]
+            work.fw[row] += work.Jw[row, a] * work.drop[a]
 
 
 @jit
-def accelerations(k):
-    """q̈ = A⁻¹ (Γ − b − g) (Eq. 1), from û = U⁻¹ Γ."""
-    n = k.v.shape[0]
+def accelerations(work):
+    """q̈ = A⁻¹ (Γ − b − g) (Eq. 1), (n,) rad/s², from û = U⁻¹ Γ."""
+    n = work.v.shape[0]
     for a in range(n):
-        k.joint_acceleration[a] = k.u[a]
-        if k.option[TASK_BIAS] != 0.0:
-            k.joint_acceleration[a] -= k.drop[a]
-    acceleration_of(k.inertia, k.joint_acceleration)
+        work.joint_acceleration[a] = work.u[a]
+        if work.option[TASK_BIAS] != 0.0:
+            work.joint_acceleration[a] -= work.drop[a]
+    acceleration_of(work.inertia, work.joint_acceleration)
 
 
 @jit
-def torque(k):
-    """Γ = U û, with the bias where it is compensated at every joint."""
-    torque_of(k.inertia, k.u, k.tau)
-    for a in range(k.v.shape[0]):
-        if k.option[KEEP_TORQUE] != 0.0:
-            k.tau[a] += k.space.start[a]
-        elif k.option[TASK_BIAS] == 0.0:
-            k.tau[a] += k.bias[a]
+def torque(work):
+    """Γ = U û, (n,) N·m, with the bias where it is compensated at every joint."""
+    torque_of(work.inertia, work.u, work.tau)
+    for a in range(work.v.shape[0]):
+        if work.option[KEEP_TORQUE] != 0.0:
+            work.tau[a] += work.space.start[a]
+        elif work.option[TASK_BIAS] == 0.0:
+            work.tau[a] += work.bias[a]
 
 
 @jit
-def start_inside(k, n):
-    """Begin with the bias where it is compensated at every joint, cut at the limits."""
-    k.space.motors[0] = 1
+def start_inside(work, n):
+    """Begin with the bias where it is compensated at every joint, cut at the limits, (n,) N·m."""
+    work.space.motors[0] = 1
     for a in range(n):
-        bias = k.bias[a] if k.option[TASK_BIAS] == 0.0 else 0.0
-        k.space.start[a] = min(max(bias, -k.torque_limit[a]), k.torque_limit[a])
+        bias = work.bias[a] if work.option[TASK_BIAS] == 0.0 else 0.0
+        work.space.start[a] = min(max(bias, -work.torque_limit[a]), work.torque_limit[a])
 
 
 @jit
-def status(k):
-    """What happened, in the numbers of `opspace.Status`."""
+def status(work):
+    """What happened, in the numbers of `opspace.Status`; fills scale (levels + 2,)."""
     bits = 0
-    if k.option[SINGULAR] != 0.0:
-        for d in range(1, k.space.u.shape[0] - 1):
-            if k.space.top[d] > 0.0 and k.space.off[d] != 0:
+    if work.option[SINGULAR] != 0.0:
+        for d in range(1, work.space.u.shape[0] - 1):
+            if work.space.top[d] > 0.0 and work.space.off[d] != 0:
                 bits |= FADED
-    for i in range(k.limit.shape[0]):
-        if k.limit_h[i] > 0.0:
+    for i in range(work.limit.shape[0]):
+        if work.limit_h[i] > 0.0:
             bits |= LIMITED
-    for a in range(k.tau.shape[0]):
-        if abs(k.tau[a]) > k.torque_limit[a]:
+    for a in range(work.tau.shape[0]):
+        if abs(work.tau[a]) > work.torque_limit[a]:
             bits |= ABOVE
-    for d in range(k.scale.shape[0]):
-        k.scale[d] = 1.0
-        if k.option[KEEP_TORQUE] != 0.0 and k.space.got[d, 1] > 0.0:
-            k.scale[d] = min(k.space.got[d, 0] / k.space.got[d, 1], 1.0)
-            if k.scale[d] < 1.0 - GIVEN_WAY:
+    for d in range(work.scale.shape[0]):
+        work.scale[d] = 1.0
+        if work.option[KEEP_TORQUE] != 0.0 and work.space.got[d, 1] > 0.0:
+            work.scale[d] = min(work.space.got[d, 0] / work.space.got[d, 1], 1.0)
+            if work.scale[d] < 1.0 - GIVEN_WAY:
                 bits |= SCALED
     return bits

@@ -7,54 +7,60 @@ from opspace.kernels.level import project, solve_level, take_alternative
 from opspace.kernels.scalars import room_for
 from opspace.machine.jit import jit
 
-# Columns of ``Space.cursor``.
+# Columns of ``Space.cursor``: corners of a node, the next one, corners of its group, next alternative.
 FIRST, END, NEXT, GROUP, GROUP_END, ALTERNATIVE = range(6)
 
 
 @jit
-def begin(n, levels, s):
-    """Nothing decided, everything free, and nothing known about any level."""
-    u, Z, top, got = s.u, s.Z, s.top, s.got
+def begin(n, levels, space):
+    """Nothing decided, everything free: u [√J/s], Z, free at depth 0; nothing known about any level."""
+    u, Z, top, got = space.u, space.Z, space.top, space.got
     for a in range(n):
         u[0, a] = 0.0
         for b in range(n):
             Z[0, a, b] = 0.0
         Z[0, a, a] = 1.0
-    s.free[0] = n
-    s.path[0] = 1.0
+    space.free[0] = n
+    space.path[0] = 1.0
     for d in range(levels + 1):
         top[d] = 0.0
         got[d, 0], got[d, 1] = 0.0, 0.0
-    if s.motors[0] != 0:
+    if space.motors[0] != 0:
         for a in range(n):
-            s.torque[0, a] = s.start[a]
+            space.torque[0, a] = space.start[a]
 
 
 @jit
-def walk(first, levels, n, slots, J, f, masks, weights, corners, rest, buffer, s, u):
+def walk(first, levels, n, slots, J, f, masks, weights, corners, rest, buffer, space, u):
     """Add Σ_T w_T H(T; f̃) to u, starting from what depth ``first`` has decided.
 
     Args:
-        first: Depth to start at; ``s.path[first]`` is the weight of everything found.
+        first: Depth to start at; ``space.path[first]`` is the weight of everything found.
         levels: Depth at which the levels end.
         n: Number of joints.
         slots: (S, 3) of every task set in the order of the levels: depth, first row, rows.
-        J: Whitened rows, (rows, n).
-        f: Their desired values.
-        masks: Corners as bit sets of slots, slot 0 the highest bit (`slot_bit`), falling.
-        weights: Weight of each corner.
+        J: (rows, n) whitened rows.
+        f: (rows,) their desired values, √J/s.
+        masks: (corners,) as bit sets of slots, slot 0 the highest bit (`slot_bit`), falling.
+        weights: (corners,) weight of each.
         corners: Their number.
         rest: (n + 1,) whitened desired value of what no task uses; entry n says whether there is one.
         buffer: See `opspace.kernels.level.solve_level`.
-        s: The memory.
-        u: (n,) whitened torque; the result is added.
+        space: `SPACE`, where `begin` has been.
+        u: (n,) whitened torque, √J/s; the result is added.
     """
-    cursor, alternatives, free, path, shares = s.cursor, s.alternatives, s.free, s.path, s.share
+    cursor, alternatives, free, path, shares = (
+        space.cursor,
+        space.alternatives,
+        space.free,
+        space.path,
+        space.share,
+    )
     _enter(first, 0, corners, cursor, alternatives)
     d = first
     while d >= first:
         if d == levels or free[d] == 0:
-            _leaf(d, n, weights, rest, s, u)
+            _leaf(d, n, weights, rest, space, u)
             d -= 1
         elif cursor[d, ALTERNATIVE] < alternatives[d]:
             i = cursor[d, ALTERNATIVE]
@@ -64,13 +70,13 @@ def walk(first, levels, n, slots, J, f, masks, weights, corners, rest, buffer, s
                 share = shares[d, i]
                 if share <= 0.0:
                     continue
-                take_alternative(d, i, n, s)
-                keep_inside(d, n, path[d] * share * group_weight(d, weights, cursor), s)
+                take_alternative(d, i, n, space)
+                keep_inside(d, n, path[d] * share * group_weight(d, weights, cursor), space)
             path[d + 1] = path[d] * share
             _enter(d + 1, cursor[d, GROUP], cursor[d, GROUP_END], cursor, alternatives)
             d += 1
         elif cursor[d, NEXT] < cursor[d, END]:
-            _next_group(d, levels, n, slots, J, f, masks, weights, rest, buffer, s)
+            _next_group(d, levels, n, slots, J, f, masks, weights, rest, buffer, space)
         else:
             d -= 1
 
@@ -89,40 +95,40 @@ def _enter(d, first, end, cursor, alternatives):
 
 
 @jit
-def _leaf(d, n, weights, rest, s, u):
-    U, Z = s.u, s.Z
+def _leaf(d, n, weights, rest, space, u):
+    U, Z = space.u, space.Z
     share = 0.0
-    for c in range(s.cursor[d, FIRST], s.cursor[d, END]):
+    for c in range(space.cursor[d, FIRST], space.cursor[d, END]):
         share += weights[c]
-    share *= s.path[d]
+    share *= space.path[d]
     for a in range(n):
         u[a] += share * U[d, a]
     if rest[n] == 0.0:
         return
-    x = s.x
+    x = space.x
     for a in range(n):
         x[a] = 0.0
-    for k in range(s.free[d]):
+    for k in range(space.free[d]):
         along = 0.0
         for a in range(n):
             along += Z[d, k, a] * rest[a]
         for a in range(n):
             x[a] += along * Z[d, k, a]
-    if s.motors[0] != 0:
-        torque_of(s.inertia, x, s.part)
-        scale = room_for(s.part, s.torque[d], s.limit)
-        last = s.got.shape[0] - 1
-        s.got[last, 0] += share * scale
-        s.got[last, 1] += share
+    if space.motors[0] != 0:
+        torque_of(space.inertia, x, space.part)
+        scale = room_for(space.part, space.torque[d], space.limit)
+        last = space.got.shape[0] - 1
+        space.got[last, 0] += share * scale
+        space.got[last, 1] += share
         share *= scale
     for a in range(n):
         u[a] += share * x[a]
 
 
 @jit
-def _next_group(d, levels, n, slots, J, f, masks, weights, rest, buffer, s):
+def _next_group(d, levels, n, slots, J, f, masks, weights, rest, buffer, space):
     """Solve this level for the next corners that agree about it."""
-    cursor, rows = s.cursor, s.rows
+    cursor, rows = space.cursor, space.rows
     here = 0
     for k in range(slots.shape[0]):
         if slots[k, 0] == d:
@@ -134,7 +140,7 @@ def _next_group(d, levels, n, slots, J, f, masks, weights, rest, buffer, s):
     while end < cursor[d, END] and masks[end] & here == present:
         share += weights[end]
         end += 1
-    share *= s.path[d]
+    share *= space.path[d]
     cursor[d, GROUP], cursor[d, GROUP_END], cursor[d, NEXT] = c, end, end
     cursor[d, ALTERNATIVE] = 0
     count = 0
@@ -144,36 +150,36 @@ def _next_group(d, levels, n, slots, J, f, masks, weights, rest, buffer, s):
                 rows[count] = row
                 count += 1
     if count == 0:
-        pass_on(d, n, s)
-        s.alternatives[d] = 1
+        pass_on(d, n, space)
+        space.alternatives[d] = 1
         return
     last = d + 1 == levels and rest[n] == 0.0
-    project(d, count, n, J, f, s)
-    heaviest = share > s.top[d]
+    project(d, count, n, J, f, space)
+    heaviest = share > space.top[d]
     if heaviest:
-        _remember(d, count, share, present, s)
-    found = solve_level(d, count, n, J, last, buffer, s)
-    s.alternatives[d] = found
+        _remember(d, count, share, present, space)
+    found = solve_level(d, count, n, J, last, buffer, space)
+    space.alternatives[d] = found
     if found == 1:
-        keep_inside(d, n, share, s)
+        keep_inside(d, n, share, space)
     if heaviest:
-        s.off[d] = 1 if found > 1 and s.faded[0] != 0 else 0
+        space.off[d] = 1 if found > 1 and space.faded[0] != 0 else 0
 
 
 @jit
-def pass_on(d, n, s):
-    """A level without tasks leaves everything as it is."""
-    u, Z = s.u, s.Z
-    r = s.free[d]
-    s.free[d + 1] = r
+def pass_on(d, n, space):
+    """A level without tasks leaves u, Z and free as they are, at depth d + 1."""
+    u, Z = space.u, space.Z
+    r = space.free[d]
+    space.free[d + 1] = r
     for a in range(n):
         u[d + 1, a] = u[d, a]
     for k in range(r):
         for a in range(n):
             Z[d + 1, k, a] = Z[d, k, a]
-    if s.motors[0] != 0:
+    if space.motors[0] != 0:
         for a in range(n):
-            s.torque[d + 1, a] = s.torque[d, a]
+            space.torque[d + 1, a] = space.torque[d, a]
 
 
 @jit
@@ -186,17 +192,17 @@ def group_weight(d, weights, cursor):
 
 
 @jit
-def keep_inside(d, n, weight, s):
-    """Scale what the level at depth ``d`` has just added, so that the motors can give it."""
-    if s.motors[0] == 0:
+def keep_inside(d, n, weight, space):
+    """Scale what the level at depth ``d`` has just added, so that the motors can give it, N·m."""
+    if space.motors[0] == 0:
         return
-    u, torque, part, x = s.u, s.torque, s.part, s.x
+    u, torque, part, x = space.u, space.torque, space.part, space.x
     for a in range(n):
         x[a] = u[d + 1, a] - u[d, a]
-    torque_of(s.inertia, x, part)
-    scale = room_for(part, torque[d], s.limit)
-    s.got[d, 0] += weight * scale
-    s.got[d, 1] += weight
+    torque_of(space.inertia, x, part)
+    scale = room_for(part, torque[d], space.limit)
+    space.got[d, 0] += weight * scale
+    space.got[d, 1] += weight
     for a in range(n):
         torque[d + 1, a] = torque[d, a] + scale * part[a]
         if scale < 1.0:
@@ -204,12 +210,12 @@ def keep_inside(d, n, weight, s):
 
 
 @jit
-def _remember(d, count, share, present, s):
+def _remember(d, count, share, present, space):
     """Keep what the heaviest branch finds at this level, for its report."""
-    B, kept, first, r = s.B, s.kept, s.first_kept[d], s.free[d]
-    s.top[d] = share
-    s.chosen[d] = present
-    s.width[d] = r
+    B, kept, first, r = space.B, space.kept, space.first_kept[d], space.free[d]
+    space.top[d] = share
+    space.chosen[d] = present
+    space.width[d] = r
     for i in range(count):
         for b in range(r):
             kept[first + i, b] = B[i, b]

@@ -42,8 +42,8 @@ from opspace.kernels.columns import (
     TOOL_AXES,
     TURN,
     WORLD,
-    Tick,
 )
+from opspace.machine.field_table import Record
 from opspace.robots.adapter import AdapterBase
 from opspace.robots.motion_axes import FramePlace, MotionAxes
 from opspace.stack import Member
@@ -117,7 +117,7 @@ class Packed:
     """
 
     def __init__(
-        self, member: Member, index: int, first: int, axes: MotionAxes, tick: Tick
+        self, member: Member, index: int, first: int, axes: MotionAxes, tick: Record
     ) -> None:
         task = member.task
         self.member = member

@@ -15,11 +15,11 @@ from opspace.kernels.columns import (
     LIMIT_LAW,
     LIMIT_PROFILE,
     LIMIT_WEIGHT,
-    Tick,
 )
 from opspace.kernels.limit_rows import DISTURBANCE, SIGN, SPEED
 from opspace.law import PROFILES
-from opspace.plan.memory import Sizes, make_tick, tick_handle
+from opspace.machine.field_table import Record
+from opspace.plan.memory import Sizes, make_tick
 from opspace.plan.pack_task import Packed
 from opspace.plan.scales import Scales
 from opspace.robots.adapter import AdapterBase
@@ -76,18 +76,18 @@ class Plan:
             limits=0 if limits is None else len(limits.sides),
             corners=_most_corners(len(self.variables), room),
         )
-        self.tick, space, self.memory = make_tick(self.size, axes, torque_limit, options)
+        self.tick, self.memory = make_tick(self.size, axes, torque_limit, options)
         self.seen: object = None
         self.moving = False
         self.packed = self._pack(scales)
         self._pack_variables()
         self._pack_slots()
-        self.first_kept = space.first_kept
+        self.first_kept = self.tick.space.first_kept
         depth, rows = self.tick.slots[:, 0], self.tick.slots[:, 2]
         self.first_kept[:] = [rows[depth < d].sum() for d in range(self.first_kept.size)]
         if limits is not None:
             _pack_limits(limits, scales, self.tick)
-        self.handle = tick_handle(self.tick, space, axes)
+        self.handle = self.tick.handle()
 
     @staticmethod
     def fits(members: Sequence[Member]) -> bool:
@@ -173,7 +173,7 @@ def _arrivals(members: Sequence[Member]) -> list[Variable]:
     return list(found.values())
 
 
-def _pack_limits(limits: JointLimits, scales: Scales, tick: Tick) -> None:
+def _pack_limits(limits: JointLimits, scales: Scales, tick: Record) -> None:
     for i, side in enumerate(limits.sides):
         tick.limit_joint[i] = side.index
         tick.limit[i, : SPEED + 1] = (

@@ -10,7 +10,7 @@ import numpy as np
 from opspace.command import LevelStatus, TaskStatus
 from opspace.kernels.spectrum import spectrum
 from opspace.kernels.walk import slot_bit
-from opspace.plan.memory import Block, reported
+from opspace.plan.memory import reported
 
 if TYPE_CHECKING:
     from opspace.plan.plan import Plan
@@ -84,9 +84,7 @@ class CompiledReport:
 
     def _found(self) -> dict[str, np.ndarray]:
         if self._parts is None:
-            block = Block(0)
-            block.memory = np.frombuffer(self._memory)
-            self._parts = reported(self._plan.size, block)
+            self._parts = reported(self._plan.size, self._memory)
         return self._parts
 
     def _level(self, found: dict[str, np.ndarray], rank: int, level: float) -> LevelStatus:

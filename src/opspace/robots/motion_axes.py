@@ -7,7 +7,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from opspace.robots.bodies import Dynamics, RigidBodies, make_dynamics, no_bodies
+from opspace.machine.field_table import Record
+from opspace.robots.bodies import make_dynamics, no_bodies
 
 
 @dataclass(frozen=True)
@@ -60,8 +61,9 @@ class MotionAxes:
         parent: (n,) the joint before each joint on the way to the base, −1 for none.
         frames: Frames by id.
         masses: Mass of the moving links.
-        bodies: What compiled code computes the dynamics from; none where the robot's library does.
-        dynamics: Where it computes them.
+        bodies: `RIGID_BODIES` that compiled code computes the dynamics from; none where the
+            robot's library does.
+        dynamics: `DYNAMICS`, where it computes them.
     """
 
     q: np.ndarray
@@ -73,5 +75,5 @@ class MotionAxes:
     parent: np.ndarray
     frames: Mapping[int, FramePlace]
     masses: tuple[MassPoint, ...]
-    bodies: RigidBodies = field(default_factory=no_bodies)
-    dynamics: Dynamics = field(default_factory=lambda: make_dynamics(no_bodies()))
+    bodies: Record = field(default_factory=no_bodies)
+    dynamics: Record = field(default_factory=lambda: make_dynamics(no_bodies()))

@@ -12,15 +12,9 @@ from typing import Any, NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from opspace.robots.bodies import (
-    ALIGNED,
-    BALL,
-    HINGE,
-    SLIDE,
-    TRANSLATION,
-    Dynamics,
-    RigidBodies,
-)
+from opspace.machine.field_table import Record
+from opspace.robots.bodies import RIGID_BODIES
+from opspace.robots.joint_kinds import ALIGNED, BALL, HINGE, SLIDE, TRANSLATION
 from opspace.robots.motion_axes import FramePlace, MassPoint, MotionAxes
 
 
@@ -29,20 +23,20 @@ class RigidModel:
     """Bodies of a robot, and what is fixed to them.
 
     Attributes:
-        bodies: The tree.
+        bodies: The tree, `RIGID_BODIES`.
         frames: Frames by the robot's own ids.
         masses: Mass of the moving links.
     """
 
-    bodies: RigidBodies
+    bodies: Record
     frames: Mapping[int, FramePlace]
     masses: tuple[MassPoint, ...]
 
-    def motion_axes(self, dynamics: Dynamics, q: np.ndarray, v: np.ndarray) -> MotionAxes:
+    def motion_axes(self, dynamics: Record, q: np.ndarray, v: np.ndarray) -> MotionAxes:
         """Return the arrays that compiled code reads of a robot that it computes itself.
 
         Args:
-            dynamics: Where it does.
+            dynamics: Where it does, `DYNAMICS`.
             q: (n,) the configuration that it reads.
             v: (n,) the velocity.
         """
@@ -80,23 +74,25 @@ def rigid_model(model: Any, frames: Sequence[int]) -> RigidModel | None:
     places = [_numbers(placement) for placement in model.jointPlacements]
     inertias = [_WORLD_INERTIA, *list(model.inertias)[1:]]
     last = np.array([-1, *(j.first_v + j.width - 1 for j in known[1:])], integers)
-    bodies = RigidBodies(
-        kind=np.array([j.kind for j in known], integers),
-        parent=np.array([model.parents[i] for i in range(model.njoints)], integers),
-        place=np.array(places),
-        axis=np.array([j.axis for j in known]),
-        along=np.array([int(np.argmax(j.axis)) for j in known], integers),
-        first_q=np.array([j.first_q for j in known], integers),
-        first_v=np.array([j.first_v for j in known], integers),
-        width=np.array([j.width for j in known], integers),
-        mass=np.array([float(inertia.mass) for inertia in inertias]),
-        centre=np.array([inertia.lever for inertia in inertias], float).reshape(-1, 3),
-        tensor=np.array([_tensor(inertia) for inertia in inertias]),
-        before=_before(model, known, last),
-        armature=np.array(model.armature, float),
-        gravity=np.array(model.gravity.linear, float),
+    fields = {
+        "kind": np.array([j.kind for j in known], integers),
+        "parent": np.array([model.parents[i] for i in range(model.njoints)], integers),
+        "place": np.array(places),
+        "axis": np.array([j.axis for j in known]),
+        "along": np.array([int(np.argmax(j.axis)) for j in known], integers),
+        "first_q": np.array([j.first_q for j in known], integers),
+        "first_v": np.array([j.first_v for j in known], integers),
+        "width": np.array([j.width for j in known], integers),
+        "mass": np.array([float(inertia.mass) for inertia in inertias]),
+        "centre": np.array([inertia.lever for inertia in inertias], float).reshape(-1, 3),
+        "tensor": np.array([_tensor(inertia) for inertia in inertias]),
+        "before": _before(model, known, last),
+        "armature": np.array(model.armature, float),
+        "gravity": np.array(model.gravity.linear, float),
+    }
+    return RigidModel(
+        RIGID_BODIES.make({}, fields), frame_places(model, frames, last), mass_points(model, last)
     )
-    return RigidModel(bodies, frame_places(model, frames, last), mass_points(model, last))
 
 
 def frame_places(model: Any, frames: Sequence[int], last: np.ndarray) -> dict[int, FramePlace]:

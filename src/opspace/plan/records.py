@@ -1,0 +1,204 @@
+"""What kernels read and write, record by record; the robot's own are in `opspace.robots.bodies`."""
+
+from __future__ import annotations
+
+import math
+from functools import partial
+
+import numpy as np
+
+from opspace.kernels.columns import (
+    KIND_SIZE,
+    NUMBERS_SIZE,
+    OPTION_SIZE,
+    VARIABLE_SIZE,
+)
+from opspace.machine.field_table import Field, RecordTable
+from opspace.robots.bodies import DYNAMICS, RIGID_BODIES
+
+SIZES = {
+    "n": "joints (velocity coordinates)",
+    "nq": "coordinates of a configuration",
+    "bodies": "bodies of the robot, the world included",
+    "links": "moving links with a mass",
+    "tasks": "tasks",
+    "rows": "rows of all tasks",
+    "slots": "places of tasks; a task that moves between levels has several",
+    "slot_rows": "rows of all places",
+    "levels": "levels of the stack",
+    "variables": "activations in time: the tasks' presences, then their changes of place",
+    "limits": "joint limits, sides counted",
+    "corners": "corners that the blend can have",
+    "widest": "the larger of rows + limits and n, at least one",
+}
+"""What the names in shapes stand for."""
+
+_INT = np.int64
+_work = Field
+_kept = partial(Field, lives="kept")
+_reported = partial(Field, lives="reported")
+_after = partial(Field, lives="tick")
+_plan = partial(Field, writer="plan", lives="plan")
+_refresh = partial(Field, writer="refresh", lives="plan")
+_tuned = partial(Field, writer="plan, refresh, tick", lives="plan")
+_terms = partial(Field, writer="refresh, tick", lives="tick")
+_robot = partial(Field, writer="robot", lives="tick")
+_body = partial(Field, writer="robot", lives="robot")
+_record = partial(Field, shape=(), lives="plan", meaning="")
+_caller = partial(Field, writer="caller")
+
+INERTIA = RecordTable(
+    "Inertia",
+    "Factor of an inertia, and where it is not zero.",
+    _work("U", ("n", "n"), "upper triangular, M = U Uᵀ", "√(kg·m²)"),
+    _work("inverse", ("n",), "one over its diagonal"),
+    _plan("before", ("n",), "coordinate before each one, −1 for none", dtype=_INT),
+    _plan("end", ("n",), "one after the last that each carries", dtype=_INT),
+)
+
+BOUNDS = RecordTable(
+    "Bounds",
+    "Bounds on accelerations and torques, and the memory to keep them.",
+    _work("lower", ("n",), "least accelerations", "rad/s²", start=-math.inf),
+    _work("upper", ("n",), "largest accelerations", "rad/s²", start=math.inf),
+    _work("least", ("n",), "least torques beside the bias", "N·m", start=-math.inf),
+    _work("most", ("n",), "largest torques beside the bias", "N·m", start=math.inf),
+    _work("normal", ("4 n", "n"), "every bound as unit normal · x <= bound, in x = Uᵀ q̈"),
+    _work("bound", ("4 n",), "the bounds", "√J/s"),
+    _work("softness", ("4 n",), "their softness"),
+    _work("multiplier", ("4 n",), "multipliers of the bounds", "√J/s"),
+    _work("wanted", ("4 n",), "multipliers of those that hold, if alone", "√J/s"),
+    _work("active", ("4 n",), "the bounds that hold", dtype=_INT),
+    _work("x", ("n",), "the point that is projected", "√J/s"),
+    _work("y", ("n",), "its projection", "√J/s"),
+    _work("row", ("n",), "a normal before it has unit length"),
+    _work("r", ("4 n",), "right-hand side of the multipliers", "√J/s"),
+    _work("G", ("4 n", "4 n"), "products of the normals that hold"),
+    _work("factor", ("4 n", "4 n"), "Cholesky factor of G"),
+)
+
+_DEPTHS = "levels + 2"
+
+SPACE = RecordTable(
+    "Space",
+    "The memory of a walk down the levels. A first axis of levels + 2 is the depth: what the levels "
+    "above have decided; joint limits are level 0, what damps the rest is the last.",
+    _work("Z", (_DEPTHS, "n", "n"), "basis of the motions still free, as rows"),
+    _work("u", (_DEPTHS, "n"), "whitened torque so far", "√J/s"),
+    _work("free", (_DEPTHS,), "number of motions still free", dtype=_INT),
+    _work("V", (_DEPTHS, "n", "n"), "directions of a level that branches, then the rest"),
+    _work("strength", (_DEPTHS, "n"), "what each direction adds to the torque", "√J/s"),
+    _work("share", (_DEPTHS, "n + 1"), "weight of each number of directions"),
+    _work("path", (_DEPTHS,), "weight of the branch that led here"),
+    _work("cursor", (_DEPTHS, 6), "where a node is, see `opspace.kernels.walk`", dtype=_INT),
+    _work("alternatives", (_DEPTHS,), "number of alternatives of the group", dtype=_INT),
+    _reported("top", (_DEPTHS,), "strongest weight that a level has been solved with"),
+    _reported(
+        "chosen", (_DEPTHS,), "slots present at a level when that was, a bit set", dtype=_INT
+    ),
+    _reported("width", (_DEPTHS,), "motions free above a level when that was", dtype=_INT),
+    _work("off", (_DEPTHS,), "whether a direction was faded when that was", dtype=_INT),
+    _work("faded", (1,), "whether one of the level solved last is", dtype=_INT),
+    _work("B", ("widest", "n"), "rows of a level in the basis of the free motions"),
+    _work("C", ("n", "widest"), "their columns, when there are more rows than columns"),
+    _work("column", ("n",), "free motions that the rows move, then the others", dtype=_INT),
+    _work("residual", ("widest",), "what the levels above leave to be done", "√J/s"),
+    _work("rows", ("widest",), "the rows of a level that are present", dtype=_INT),
+    _work("G", ("n", "n"), "products of rows or columns"),
+    _work("R", ("n", "n"), "triangular factor"),
+    _work("Y", ("n", "n"), "right singular vectors"),
+    _work("x", ("widest",), "any vector"),
+    _work("y", ("widest",), "any other vector"),
+    _work("scale", ("widest",), "scales of reflectors"),
+    _work("sigma", ("n",), "singular values"),
+    _reported("kept", ("slot_rows", "n"), "B of each level when `top` was found"),
+    _plan("first_kept", (_DEPTHS,), "row where that begins for each level", dtype=_INT),
+    _work("motors", (1,), "whether torque limits are kept", dtype=_INT),
+    _record("inertia", of=INERTIA),
+    _work("start", ("n",), "torque before the first level, within limits", "N·m"),
+    _plan("limit", ("n",), "largest torque of each joint", "N·m", start=math.inf),
+    _work("torque", (_DEPTHS, "n"), "torque so far", "N·m"),
+    _work("part", ("n",), "torque that a level adds", "N·m"),
+    _work("got", (_DEPTHS, 2), "sums of weight times scale, and of weight"),
+)
+
+TICK = RecordTable(
+    "Tick",
+    "Everything that one tick reads, writes and works with. `opspace.kernels.columns` names the "
+    "columns of `kind`, `numbers`, `variable`, `limit` and `option`.",
+    _robot("q", ("nq",), "configuration; quaternions wxyz", "rad, m"),
+    _robot("v", ("n",), "velocity", "rad/s, m/s"),
+    _robot("M", ("n", "n"), "joint-space inertia", "kg·m²"),
+    _robot("bias", ("n",), "b + g", "N·m"),
+    _robot("axes", ("n", 6), "motion that a unit of each velocity gives to a body"),
+    _robot("placement", ("bodies", 12), "rotation by columns, then position", "m"),
+    _body("parent", ("n",), "coordinate before each one, −1 for none", dtype=_INT),
+    _body("mass_place", ("links", 2), "body and joint of each mass", dtype=_INT),
+    _body("mass", ("links", 4), "mass, and its centre on the body", "kg, m"),
+    _tuned("kind", ("tasks", KIND_SIZE), "a task as whole numbers", dtype=_INT),
+    _tuned("numbers", ("tasks", NUMBERS_SIZE), "a task as numbers"),
+    _plan("coordinate", ("rows",), "coordinate of each row of a joint task", dtype=_INT),
+    _plan("select", ("rows", 6), "what a row selects of a motion"),
+    _refresh("goal", ("rows", 3), "q, v, a that joint tasks want", "rad, rad/s, rad/s²"),
+    _refresh("kp", ("rows",), "gain on the error", "1/s²"),
+    _refresh("kv", ("rows",), "gain on its rate", "1/s"),
+    _plan("row_weight", ("rows",), "1/√reference", start=1.0),
+    _plan(
+        "variable", ("variables", VARIABLE_SIZE), "an activation in time, as `ramp` takes it", "s"
+    ),
+    _kept("group", ("variables",), "how each activation is blended", dtype=_INT),
+    _plan("slots", ("slots", 3), "depth, first row, rows, in the order of the levels", dtype=_INT),
+    _plan("slot_on", ("slots",), "variables that are on when a task is there", dtype=_INT),
+    _plan("slot_off", ("slots",), "variables that are off then", dtype=_INT),
+    _plan("slot_place", ("slots",), "those of `slot_on` that choose its place", dtype=_INT),
+    _refresh("own", ("tasks",), "activation of each task by its own function", start=1.0),
+    _plan("limit_joint", ("limits",), "joint of each limit", dtype=_INT),
+    _tuned("limit", ("limits", 7), "joint limits, see `opspace.kernels.limit_rows`"),
+    _plan("torque_limit", ("n",), "what the motors give", "N·m"),
+    _plan("option", (OPTION_SIZE,), "options of the controller"),
+    _reported("tau", ("n",), "the torque", "N·m"),
+    _reported("h", ("tasks",), "activation of each task"),
+    _reported("share", ("slots",), "how much of a task is at each of its places"),
+    _reported("error", ("rows",), "x_d − x", "m, rad"),
+    _reported("limit_h", ("limits",), "how much each joint limit takes part"),
+    _reported("scale", (_DEPTHS,), "part of its torque that each level got"),
+    _terms("wanted", ("rows",), "f*, the commanded acceleration", "m/s², rad/s²"),
+    _work("limit_wanted", ("limits",), "the acceleration that each limit is given", "rad/s²"),
+    _work("Jw", ("rows + limits", "n"), "whitened rows Ĵ = W J U⁻ᵀ"),
+    _terms("J", ("rows", "n"), "Jacobians", "m, 1"),
+    _terms("drift", ("rows",), "J̇ q̇", "m/s², rad/s²"),
+    _work("fw", ("rows + limits",), "f̂ = W f̃", "√J/s"),
+    _work("velocity", ("n", 6), "motion of the body behind each joint", "m/s, rad/s"),
+    _work("acceleration", ("n", 6), "its rate at zero joint acceleration", "m/s², rad/s²"),
+    _work("motion", (3, 24), "frames of a task, see `opspace.kernels.motion`"),
+    _work("motion_J", (3, 6, "n"), "their Jacobians", "m, 1"),
+    _work("motion_error", (6,), "error of a motion", "m, rad"),
+    _work("value", ("variables",), "activations at this time"),
+    _work("chained", ("variables",), "whether each belongs to the chain", dtype=_INT),
+    _work("order", ("variables + 1",), "the chain, the most active first", dtype=_INT),
+    _work("corner_on", ("2 corners",), "slots that are on in each corner, bit sets", dtype=_INT),
+    _work("corner_weight", ("2 corners",), "weights of the corners"),
+    _work("limit_on", ("limits + 1", "limits"), "limits that are on in each corner", dtype=_INT),
+    _work("limit_weight", ("limits + 1",), "weights of those corners"),
+    _work("limit_order", ("limits + 1",), "the chain of the limits", dtype=_INT),
+    _work("rest", ("n + 1",), "f̂ of what no task uses, and whether there is one", "√J/s"),
+    _work("u", ("n",), "whitened torque", "√J/s"),
+    _work("drop", ("n",), "whitened bias", "√J/s"),
+    _after("joint_acceleration", ("n",), "q̈ of the torque", "rad/s²"),
+    _record("inertia", of=INERTIA),
+    _record("space", of=SPACE),
+    _record("bodies", of=RIGID_BODIES),
+    _record("dynamics", of=DYNAMICS),
+    _record("bounds", of=BOUNDS),
+)
+
+
+REMEMBERED = RecordTable(
+    "Remembered",
+    "What a tick takes over from the one before, the same for every state of a batch.",
+    _caller("group", ("variables",), "how each activation is blended", dtype=_INT),
+    _caller("remembers", ("tasks",), "whether the turn is known", dtype=_INT),
+    _caller("turn", ("tasks", 4), "last rotation of the task, quaternion wxyz"),
+)
+
+TABLES = (TICK, SPACE, INERTIA, BOUNDS, RIGID_BODIES, DYNAMICS, REMEMBERED)
