@@ -152,7 +152,7 @@ class Packed:
     def remember(self, before: Packed | None) -> None:
         """Go on from the same task in the plan before: which way round a rotation went."""
         if self.turn is None or before is self:
-            return
+            return  # none is remembered, or it is there already
         if before is None or before.turn is None:
             self.remembers[0] = 0
         else:

@@ -85,6 +85,7 @@ class Plan:
         self.seen: object = None
         self.moving = False
         self.packed = self._pack(scales)
+        self._pack_variables()
         self._pack_slots()
         self.first_kept = space.first_kept
         depth, rows = self.tick.slots[:, 0], self.tick.slots[:, 2]
@@ -140,7 +141,8 @@ class Plan:
         self.tick.group[:] = [groups.get(v, 0) for v in self.variables]
         for packed, member in zip(self.packed, members, strict=True):
             packed.member = member
-            packed.remember(known.get(member))
+            if packed.turn is not None:
+                packed.remember(known.get(member))
         self._pack_variables()
 
     def leave(self, members: Sequence[Member], blending: Blending) -> None:
@@ -157,7 +159,9 @@ class Plan:
     def come_back(self, blending: Blending) -> None:
         """Go on where the readable form was at the tick before."""
         exact, chained = blending.remembered()
-        self.tick.group[:] = [EXACT * (v in exact) + CHAINED * (v in chained) for v in self.variables]
+        self.tick.group[:] = [
+            EXACT * (v in exact) + CHAINED * (v in chained) for v in self.variables
+        ]
         for packed in self.packed:
             packed.come_back()
 
@@ -224,9 +228,9 @@ def _arrivals(members: Sequence[Member]) -> list[Variable]:
     """List the activations that move tasks between places, each once."""
     found: dict[int, Variable] = {}
     for member in members:
-        for place in member.places:
-            if place.arrival is not None:
-                found.setdefault(id(place.arrival), place.arrival)
+        for place in member.places[1:]:  # the first place has none
+            assert place.arrival is not None
+            found.setdefault(id(place.arrival), place.arrival)
     return list(found.values())
 
 

@@ -14,7 +14,6 @@ from opspace.stack.changes import Insert, Known, Request
 from opspace.stack.members import Member, Place, Variable
 from opspace.tasks import Task
 
-
 AHEAD = 32
 """Changes of the stack that are foreseen."""
 
@@ -148,10 +147,9 @@ class Transitions:
                 self._asked = False
                 if self._now is not None:
                     self._period = t - self._now
-                started = self._start_due(t)
-                if self._tidy(t) or started:
+                started = bool(self._queue) and self._start_due(t)
+                if self._settle(t) or started:
                     self._change()
-                self._next = self._next_event(t)
             finally:
                 self._lock.release()
         self._now = t
@@ -183,9 +181,9 @@ class Transitions:
         t = (self._now or 0.0) + self._period
         for _ in range(AHEAD):
             self._start_due(t)
-            self._tidy(t)
+            self._settle(t)
             yield tuple(self._members.values())
-            self._now, t = t, self._next_event(t)
+            self._now, t = t, self._next
             if t == math.inf:
                 return
 
@@ -207,27 +205,38 @@ class Transitions:
         self._queue = waiting
         return started
 
-    def _tidy(self, t: float) -> bool:
-        tidied = False
-        for name, member in list(self._members.items()):
-            if member.gone(t):
-                del self._members[name]
-                tidied = True
-            elif len(member.places) > 1 and member.tidy(t):
-                tidied = True
-        return tidied
+    def _settle(self, t: float) -> bool:
+        """Drop what has left, and find when the next request is due or the next ramp arrives.
 
-    def _next_event(self, t: float) -> float:
-        """Return the time at which the next request is due or the next ramp arrives, s."""
-        starts = (queued.request.timing.start_time for queued in self._queue)
-        due = [-math.inf if start is None else start for start in starts]
-        ramps = [
-            variable.ramp.start_time + variable.ramp.duration
-            for member in self._members.values()
-            for variable in (member.presence, *(place.arrival for place in member.places))
-            if variable is not None and not variable.arrived(t)
-        ]
-        return min([*due, *ramps], default=math.inf)
+        One pass, for the tick that does it has other work to do.
+
+        Returns:
+            Whether a task or a place of one is gone.
+        """
+        gone: list[str] = []
+        tidied = False
+        following = math.inf
+        for name, member in self._members.items():
+            ramp = member.presence.ramp
+            end = ramp.start_time + ramp.duration
+            if t < end and ramp.duration != 0.0:
+                following = min(following, end)
+            elif ramp.target == 0.0:
+                gone.append(name)
+                continue
+            if len(member.places) > 1:
+                tidied = member.tidy(t) or tidied
+                for place in member.places[1:]:
+                    assert place.arrival is not None
+                    ramp = place.arrival.ramp
+                    following = min(following, ramp.start_time + ramp.duration)
+        for name in gone:
+            del self._members[name]
+        for queued in self._queue:
+            start = queued.request.timing.start_time
+            following = min(following, -math.inf if start is None else start)
+        self._next = following
+        return tidied or bool(gone)
 
     def _waiting(self) -> list[Task]:
         return [q.request.task for q in self._queue if isinstance(q.request, Insert)]
