@@ -125,7 +125,7 @@ def largest_step(dt, robot):
     controller = Controller(robot.fresh(), stack)
     for i, k in enumerate((4, 3, 2, 1, 0)):  # in another order than that of the list
         stack.remove(moving[k], 0.4, start_time=0.01 + 0.02 * i)
-    stack.move(far[0], 3.0, 0.1, start_time=0.7)
+    stack.move(far[0], 3.0, 0.1, start_time=0.2)
     q, v = state(robot)
     forms, taus = [], []
     for k in range(round(0.22 / dt)):
