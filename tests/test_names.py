@@ -12,8 +12,6 @@ SAME_FILE = {
     "__init__.py",
     "__main__.py",
     # The readable law and the kernel of the same equation, each in its own package.
-    "saturation.py",
-    "scalars.py",
 }
 
 

@@ -262,13 +262,16 @@ def bench(
     readable: Annotated[
         bool, typer.Option("--readable", help="Time the readable form of the tick as well.")
     ] = False,
+    changes: Annotated[
+        int, typer.Option(help="Time so many changes of a stack of each kind as well.", min=0)
+    ] = 0,
     against: Annotated[
         Path | None, typer.Option(help="JSON file of an earlier run to compare with.")
     ] = None,
     out: Annotated[Path, typer.Option(help="Directory to write to.")] = Path("results/bench"),
 ) -> None:
     """Time the tick, in turns with the model's own calls and with other controllers."""
-    from opspace.bench import Benchmark, compare_runs, run_benchmark
+    from opspace.bench import Benchmark, changes_table, compare_runs, run_benchmark
     from opspace.plots import save
     from opspace.plots.benchmark import benchmark_figure
 
@@ -281,6 +284,9 @@ def bench(
     _print_table(*found.table())
     print()
     _print_table(*found.batch_table())
+    if changes:
+        print()
+        _print_table(*changes_table(changes))
     if before is not None:
         print()
         _print_table(*compare_runs(before, found))

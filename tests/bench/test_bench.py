@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from opspace.bench import SCENES, Benchmark, compare_runs, run_benchmark
+from opspace.bench import SCENES, Benchmark, changes_table, compare_runs, run_benchmark
 from opspace.bench.timing import interleaved
 from opspace.controller.batch import cores
 from opspace.errors import InputError, UnknownNameError
@@ -78,3 +78,13 @@ def test_the_figure_shows_every_scene():
     left, right = benchmark_figure(scenes).axes
     assert [label.get_text() for label in left.get_yticklabels()] == ["panda"]
     assert len(right.lines) == 2
+
+
+@pytest.mark.skipif("panda" not in INSTALLED, reason="needs opspace[robots]")
+def test_changes_of_the_stack_are_timed_beside_the_ticks_around_them():
+    heads, rows = changes_table(2)
+    assert {row[1] for row in rows} == {"hot", "paced"}
+    assert len(rows) == 12
+    assert all(len(row) == len(heads) and float(row[-1]) > 0.0 for row in rows)
+    with pytest.raises(InputError, match="at least once"):
+        changes_table(0)

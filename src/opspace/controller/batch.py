@@ -201,10 +201,7 @@ def check_members(members: tuple[Member, ...]) -> None:
 def _remembered(plan: Plan, before: Plan | None) -> Handle:
     """Return what the plan before leaves to this one."""
     tick = plan.tick
-    tick.group[:] = 0
-    tick.kind[:, REMEMBERS] = 0
-    if before is not None:
-        plan.go_on_from(before)
+    plan.go_on_from(before, plan.members)
     found = {
         "group": tick.group.copy(),
         "remembers": tick.kind[:, REMEMBERS].copy(),

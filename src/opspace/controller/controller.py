@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Mapping
 from math import isfinite
+from types import MappingProxyType
 from typing import TypeAlias
 
 import numpy as np
@@ -31,7 +32,7 @@ from opspace.kernels.columns import (
 )
 from opspace.law import PROFILES
 from opspace.machine.record import Handle
-from opspace.plan.plan import Plan
+from opspace.plan.plan import Plan, structure
 from opspace.plan.read_report import CompiledReport
 from opspace.robots.adapter import AdapterBase
 from opspace.robots.bodies import make_dynamics
@@ -77,6 +78,9 @@ class Controller(ReferenceController):
     # What every tick needs, in one piece: reading an attribute takes as long as a line of local names.
     _fixed: _Fixed | None = None
     _laid_out: _LaidOut | None = None
+    _readable = False  # whether the tick before was the readable form's
+    # Plans laid out before they are needed, by structure: replaced as a whole, never changed.
+    _ready: Mapping[tuple[object, ...], Plan] = MappingProxyType({})
 
     def step(self, t: float, q: ArrayLike, v: ArrayLike) -> Command:
         """Compute the torque for one state; see `ReferenceController.step`."""
@@ -108,6 +112,7 @@ class Controller(ReferenceController):
         if laid_out is None or members is not laid_out[0]:
             if not Plan.fits(members):
                 robot.update(robot.q, robot.v)
+                self._leave(members)
                 return self._answer(t, members, STATUSES[timing])
             laid_out = self._lay_out(members)
         _, plan, handle, torque, memory = laid_out
@@ -211,6 +216,7 @@ class Controller(ReferenceController):
             self._observer,
             tick_entry(),
         )
+        self.stack.foresee(self._lay_out_ahead)
         return seconds
 
     def _compiled_robot(self) -> MotionAxes | None:
@@ -243,15 +249,41 @@ class Controller(ReferenceController):
         compiled_batch()
         return Batch(robot, self._bodies, members, self._planned, threads)
 
+    def _lay_out_ahead(self, to_come: Iterator[tuple[Member, ...]]) -> None:
+        """Make the plans that will be needed, so that a tick has only to take one up."""
+        axes, known, now = self._axes, self._ready, self._plan
+        assert axes is not None
+        ready: dict[tuple[object, ...], Plan] = {} if now is None else {now.structure: now}
+        for members in to_come:
+            key = structure(members)
+            if key not in ready and Plan.fits(members):
+                ready[key] = known.get(key) or self._planned(members, axes)
+        self._ready = ready
+
     def _lay_out(self, members: tuple[Member, ...]) -> _LaidOut:
         assert self._axes is not None
-        plan = self._plan = self._planned(members, self._axes)
+        before, key = self._plan, structure(members)
+        if before is not None and before.structure == key:
+            plan = before
+        else:
+            plan = self._ready.get(key) or self._planned(members, self._axes)
+        plan.go_on_from(before, members)
+        if self._readable:
+            plan.come_back(self._blending)
+            self._readable = False
+        self._plan = plan
         memory = plan.memory
         laid_out = self._laid_out = members, plan, plan.handle, plan.tick.tau.copy, memory.tobytes
         return laid_out
 
+    def _leave(self, members: tuple[Member, ...]) -> None:
+        """Let the readable form go on from the compiled one."""
+        if self._plan is not None:
+            self._plan.leave(members, self._blending)
+        self._plan, self._laid_out, self._readable = None, None, True
+
     def _planned(self, members: tuple[Member, ...], axes: MotionAxes) -> Plan:
-        plan = Plan(
+        return Plan(
             members,
             axes,
             self._scales,
@@ -260,9 +292,6 @@ class Controller(ReferenceController):
             self._options(),
             self._blending.room,
         )
-        if self._plan is not None:
-            plan.go_on_from(self._plan)
-        return plan
 
     def _options(self) -> np.ndarray:
         option = np.zeros(OPTION_SIZE)

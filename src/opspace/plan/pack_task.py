@@ -47,12 +47,15 @@ from opspace.machine.field_table import Record
 from opspace.robots.adapter import AdapterBase
 from opspace.robots.motion_axes import FramePlace, MotionAxes
 from opspace.stack import Member
-from opspace.tasks import TASK_KINDS, PostureTask, Task
+from opspace.tasks import TASK_KINDS, Task
 from opspace.tasks.activations import own_activation
 from opspace.tasks.gains import Gains
 from opspace.tasks.motion_task import MotionTask
 from opspace.tasks.motions import CenterOfMass, RelativeFrame, WorldFrame
+from opspace.tasks.posture import PostureTask
 from opspace.tasks.quantities import Orientation, Pose, Position
+from opspace.tasks.references import Sample
+from opspace.tasks.tracking import Hold
 
 QUANTITIES = {Position: POSITION, Orientation: ORIENTATION, Pose: POSE}
 SOURCES = {WorldFrame: WORLD, RelativeFrame: RELATIVE, CenterOfMass: CENTRE_OF_MASS}
@@ -72,6 +75,8 @@ HONOURED = {
 does."""
 PACKED_ONCE = ("source", "quantity", "selection", "in_tool_axes", "layout", "rows")
 """Attributes that a subclass may not compute anew, as a property would."""
+
+SETTLED = (MotionTask.desired, PostureTask.desired)
 
 
 def kind_of(task: Task) -> int:
@@ -139,10 +144,16 @@ class Packed:
         covers = isinstance(task, PostureTask) and task.rows == axes.v.size
         kind[COVERS_ALL] = int(covers)
         tick.numbers[index] = np.zeros(NUMBERS_SIZE)
+        # Which way round the rotation went, where there is one.
+        self.remembers = kind[REMEMBERS : REMEMBERS + 1]
+        self.turn: np.ndarray | None = None
         if kind[KIND] == MOTION:
             self._pack_source(axes)
+            if kind[QUANTITY] != POSITION:
+                self.turn = tick.numbers[index, TURN : TURN + 4]
         elif kind[KIND] == JOINTS:
             tick.coordinate[self.rows] = self.task.layout.coordinates
+        self._pack_ahead()
 
     def refresh(self, robot: AdapterBase, t: float) -> None:
         """Bring the arrays up to date with the task at time ``t`` [s].
@@ -176,11 +187,27 @@ class Packed:
         silent = kind.activation is not None or kind.__setattr__ is not Task.__setattr__
         self.moving = self.own_kind or self._timed or self._own_activation or silent
 
-    def remember(self, before: Packed) -> None:
+    def remember(self, before: Packed | None) -> None:
         """Go on from the same task in the plan before: which way round a rotation went."""
-        self._tick.kind[self.index, REMEMBERS] = before._tick.kind[before.index, REMEMBERS]
-        turn = slice(TURN, TURN + 4)
-        self._tick.numbers[self.index, turn] = before._tick.numbers[before.index, turn]
+        if self.turn is None or before is self:
+            return  # none is remembered, or it is there already
+        if before is None or before.turn is None:
+            self.remembers[0] = 0
+        else:
+            self.remembers[0] = before.remembers[0]
+            self.turn[:] = before.turn
+
+    def leave(self) -> None:
+        """Let the readable form go on with the turn of the rotation, from the tick before."""
+        if self.turn is not None:
+            w, x, y, z = self.turn.tolist()
+            self.task.quantity.turn.previous = (w, x, y, z) if self.remembers[0] else None
+
+    def come_back(self) -> None:
+        """Go on with the turn of the rotation, from the readable form's tick before."""
+        if self.turn is not None and self.task.quantity.turn.previous is not None:
+            self.turn[:] = self.task.quantity.turn.previous
+            self.remembers[0] = 1
 
     def _evaluate(self, robot: AdapterBase, t: float) -> None:
         tick, rows = self._tick, self.rows
@@ -204,13 +231,33 @@ class Packed:
             f"{'' if np.isfinite(found).all() else ' with numbers that are not finite'}"
         )
 
+    def _pack_ahead(self) -> None:
+        """Pack what is known before the tick, from any thread; `refresh` sees what changes later."""
+        task = self.task
+        if self.own_kind or type(task).desired not in SETTLED:
+            return
+        target, held = task._target, task._held
+        goal = target.goal
+        if isinstance(goal, Hold):
+            if held is None or held[0] is not goal:
+                return
+            goal = held[1]
+        elif callable(goal):
+            return
+        sample = Sample(goal, target.velocity, target.acceleration)
+        self._write(sample, target, held, task._gains)
+
     def _pack(self, robot: AdapterBase, t: float) -> None:
-        task, tick, rows = self.task, self._tick, self.rows
+        task = self.task
         target = task._target
         if not self._timed:  # it may hold what it finds
             robot.check_state(robot.q, robot.v)
         gains = task._gains
         desired = task.desired(robot, t)
+        self._write(desired, target, task._held, gains)
+
+    def _write(self, desired: Any, target: Any, held: object, gains: Any) -> None:
+        tick, rows = self._tick, self.rows
         if gains is not self.gains:
             tick.kp[rows], tick.kv[rows] = gains.kp, gains.kv
             limited = gains.max_speed is not None
@@ -222,7 +269,7 @@ class Packed:
             tick.goal[rows, 0], tick.goal[rows, 1], tick.goal[rows, 2] = desired
         else:
             self._pack_goal(desired)
-        self.target, self.held, self.gains = target, task._held, gains
+        self.target, self.held, self.gains = target, held, gains
         self._timed = callable(target.goal)
 
     def _pack_goal(self, desired: Any) -> None:

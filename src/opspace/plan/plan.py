@@ -17,6 +17,7 @@ from opspace.kernels.columns import (
     LIMIT_WEIGHT,
 )
 from opspace.kernels.limit_rows import DISTURBANCE, SIGN, SPEED
+from opspace.kernels.tick import CHAINED, EXACT
 from opspace.law import PROFILES
 from opspace.machine.field_table import Record
 from opspace.plan.memory import Sizes, make_tick
@@ -24,7 +25,7 @@ from opspace.plan.pack_task import Packed
 from opspace.plan.scales import Scales
 from opspace.robots.adapter import AdapterBase
 from opspace.robots.motion_axes import MotionAxes
-from opspace.stack import Member, Variable
+from opspace.stack import Blending, Member, Variable
 from opspace.tasks import JointLimits
 from opspace.tasks.task import CHANGES
 
@@ -56,6 +57,7 @@ class Plan:
         room: int,
     ) -> None:
         self.members = members
+        self.structure = structure(members)
         self.axes = axes
         self.limits = limits
         self.n = axes.v.size
@@ -118,14 +120,47 @@ class Plan:
         tick = self.tick
         tick.limit[:, DISTURBANCE] = tick.limit[:, SIGN] * acceleration[tick.limit_joint]
 
-    def go_on_from(self, before: Plan) -> None:
-        """Keep what the plan before remembers: groups of the blend, turns of rotations."""
-        groups = dict(zip(map(id, before.variables), before.tick.group.tolist(), strict=True))
-        self.tick.group[:] = [groups.get(id(v), 0) for v in self.variables]
-        known = {id(packed.member): packed for packed in before.packed}
+    def groups(self) -> dict[object, int]:
+        """Return the group of the blend that each activation is in."""
+        return dict(zip(self.variables, self.tick.group.tolist(), strict=True))
+
+    def go_on_from(self, before: Plan | None, members: tuple[Member, ...]) -> None:
+        """Take these tasks, of the same structure, and keep what the plan before remembers of them.
+
+        Args:
+            before: The plan before, which may be this one: groups of the blend, turns of rotations.
+            members: The tasks with their ramps.
+        """
+        groups = {} if before is None else before.groups()
+        known = {} if before is None else {packed.member: packed for packed in before.packed}
+        self.members = members
+        self.variables = [*members, *_arrivals(members)]
+        self.tick.group[:] = [groups.get(v, 0) for v in self.variables]
+        for packed, member in zip(self.packed, members, strict=True):
+            packed.member = member
+            if packed.turn is not None:
+                packed.remember(known.get(member))
+        self._pack_variables()
+
+    def leave(self, members: Sequence[Member], blending: Blending) -> None:
+        """Let the readable form go on with these tasks where this plan was at the tick before."""
+        groups = self.groups()
+        exact, chained = (
+            [who for who, group in groups.items() if group == one] for one in (EXACT, CHAINED)
+        )
+        blending.remember(exact, chained)
         for packed in self.packed:
-            if id(packed.member) in known:
-                packed.remember(known[id(packed.member)])
+            if packed.member in members:
+                packed.leave()
+
+    def come_back(self, blending: Blending) -> None:
+        """Go on where the readable form was at the tick before."""
+        exact, chained = blending.remembered()
+        self.tick.group[:] = [
+            EXACT * (v in exact) + CHAINED * (v in chained) for v in self.variables
+        ]
+        for packed in self.packed:
+            packed.come_back()
 
     def _pack(self, scales: Scales) -> list[Packed]:
         packed: list[Packed] = []
@@ -138,9 +173,12 @@ class Plan:
         return packed
 
     def _pack_variables(self) -> None:
-        for row, variable in zip(self.tick.variable, self.variables, strict=True):
+        rows: list[tuple[float, ...]] = []
+        for variable in self.variables:
             ramp = (variable.presence if isinstance(variable, Member) else variable).ramp
-            row[:] = PROFILES.index(ramp.profile), *ramp.numbers
+            rows.append((PROFILES.index(ramp.profile), *ramp.numbers))
+        if rows:
+            self.tick.variable[:] = rows
 
     def _pack_slots(self) -> None:
         tick = self.tick
@@ -157,6 +195,15 @@ class Plan:
             tick.slot_off[s] = sum({1 << index[id(arrival)] for arrival in later})
 
 
+def structure(members: Sequence[Member]) -> tuple[object, ...]:
+    """Tell what a plan is laid out for: which tasks are at which levels, moved by how many ramps."""
+    seen: dict[Variable | None, int] = {}
+    return tuple(
+        (id(m.task), *((p.level, seen.setdefault(p.arrival, len(seen))) for p in m.places))
+        for m in members
+    )
+
+
 def _most_corners(variables: int, room: int) -> int:
     """Corners if everything moves: any task may be given an activation of its own at any time."""
     exact = min(variables, room)
@@ -167,9 +214,9 @@ def _arrivals(members: Sequence[Member]) -> list[Variable]:
     """List the activations that move tasks between places, each once."""
     found: dict[int, Variable] = {}
     for member in members:
-        for place in member.places:
-            if place.arrival is not None:
-                found.setdefault(id(place.arrival), place.arrival)
+        for place in member.places[1:]:  # the first place has none
+            assert place.arrival is not None
+            found.setdefault(id(place.arrival), place.arrival)
     return list(found.values())
 
 

@@ -68,7 +68,7 @@ class Request(ABC):
 
     @abstractmethod
     def apply(self, members: dict[str, Member], t: float) -> None:
-        """Start the transition at time ``t`` [s]; ``members`` is changed in place."""
+        """Start the transition at time ``t`` [s]; ``members`` is changed in place, no task is."""
 
 
 @dataclass(frozen=True)
@@ -99,7 +99,6 @@ class Insert(Request):
         timing = self.timing
         member = members.get(self.task.name)
         if member is None or member.gone(t):
-            self.task.reset()
             presence = Variable(0.0, timing.profile)
             member = members[self.task.name] = Member(self.task, presence, [Place(self.level)])
         elif member.level != self.level:

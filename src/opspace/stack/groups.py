@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from types import MappingProxyType
 
 from opspace.errors import unknown_name
@@ -40,6 +40,14 @@ class Blending:
         self.room = EXACT[name]
         self._exact: set[object] = set()
         self._chained: set[object] = set()
+
+    def remember(self, exact: Iterable[object], chained: Iterable[object]) -> None:
+        """Go on from where another form of the tick had these activations in each group."""
+        self._exact, self._chained = set(exact), set(chained)
+
+    def remembered(self) -> tuple[frozenset[object], frozenset[object]]:
+        """Return the activations in the exact group and in the chain."""
+        return frozenset(self._exact), frozenset(self._chained)
 
     def corners(self, variables: Sequence[object], values: Sequence[float]) -> list[Weighted]:
         """List the corners for the activations of this tick.

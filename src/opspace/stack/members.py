@@ -104,15 +104,16 @@ class Member:
         """Tell whether nothing about it changes from time ``t`` [s] on."""
         return len(self.places) == 1 and self.presence.arrived(t)
 
-    def tidy(self, t: float) -> None:
-        """Forget the places that it has left or will not come to."""
+    def tidy(self, t: float) -> bool:
+        """Forget the places that it has left or will not come to, and tell whether there were any."""
         kept: list[Place] = []
         for place in self.places:
             if place.arrival is None or not place.arrival.arrived(t):
                 kept.append(place)
             elif place.arrival.target == 1.0:
                 kept = [Place(place.level)]
-        self.places = kept
+        before, self.places = self.places, kept
+        return len(kept) < len(before)
 
     def move(self, level: float, duration: float, t: float, profile: str) -> None:
         """Send it to a level, back over its own steps where it has just come from there."""

@@ -265,6 +265,15 @@ class Stack:
         """
         self._transitions.attach(prepare)
 
+    def foresee(self, foresee: Callable[[Iterator[tuple[Member, ...]]], None]) -> None:
+        """Let a controller lay out what is to come, in the thread that asks for it.
+
+        Args:
+            foresee: Called now and at every request with the tasks after each event to come; they
+                are copies, which hold only until it takes the next.
+        """
+        self._transitions.foresee(foresee)
+
     def begin_tick(self, t: float) -> tuple[Member, ...]:
         """Start what is due at time ``t`` [s], drop what has left, and return the tasks there are.
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from bisect import insort
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from copy import deepcopy
 from threading import Lock, RLock
 from typing import NamedTuple
 
@@ -12,6 +13,9 @@ from opspace.errors import InputError, OpspaceError
 from opspace.stack.changes import Insert, Known, Request
 from opspace.stack.members import Member, Place, Variable
 from opspace.tasks import Task
+
+AHEAD = 32
+"""Changes of the stack that are foreseen."""
 
 
 class _Queued(NamedTuple):
@@ -31,6 +35,8 @@ class Transitions:
         self._now: float | None = None
         self._ticked: tuple[Member, ...] = ()
         self._prepare: Callable[[Task], None] | None = None
+        self._foresee: Callable[[Iterator[tuple[Member, ...]]], None] | None = None
+        self._period = 0.0
         # Nothing happens to the stack before this time, unless something new is asked.
         self._next = -math.inf
         self._asked = False
@@ -84,15 +90,18 @@ class Transitions:
                 with self._lock:
                     self._checked(request)
                 self.prepare(request.task)
+            self._look_ahead(request)
             with self._lock:
-                insort(self._queue, self._checked(request), key=lambda queued: queued.order)
+                self._add(request)
                 self._asked = True
 
     def cancel(self) -> None:
         """Empty the queue."""
-        with self._requesting, self._lock:
-            self._queue.clear()
-            self._asked = True
+        with self._requesting:
+            with self._lock:
+                self._queue.clear()
+                self._asked = True
+            self._look_ahead()
 
     def prepare(self, task: Task) -> None:
         """Get a task ready that no tick is using."""
@@ -111,6 +120,12 @@ class Transitions:
                 prepare(task)
             self._prepare = prepare
 
+    def foresee(self, foresee: Callable[[Iterator[tuple[Member, ...]]], None]) -> None:
+        """Tell now, and before every request is queued, what stacks are to come."""
+        with self._requesting:
+            self._foresee = foresee
+            self._look_ahead()
+
     def begin_tick(self, t: float) -> tuple[Member, ...]:
         """Start what is due, and drop what has left.
 
@@ -122,7 +137,7 @@ class Transitions:
 
         Returns:
             The tasks of this tick, which only the thread of the controller changes: the same
-            object as at the tick before if nothing has begun or ended since.
+            object as at the tick before if nothing has begun, and no task or place gone, since.
         """
         if t < self._next and not self._asked:
             self._now = t
@@ -130,16 +145,49 @@ class Transitions:
         if self._lock.acquire(blocking=False):
             try:
                 self._asked = False
-                self._start_due(t)
-                self._tidy(t)
-                self._next = self._next_event(t)
-                self._ticked = tuple(self._members.values())
+                if self._now is not None:
+                    self._period = t - self._now
+                started = bool(self._queue) and self._start_due(t)
+                if self._settle(t) or started:
+                    self._change()
             finally:
                 self._lock.release()
         self._now = t
         return self._ticked
 
-    def _start_due(self, t: float) -> None:
+    def _change(self) -> None:
+        members = tuple(self._members.values())
+        for member in members:
+            if member not in self._ticked:
+                member.task.reset()
+        self._ticked = members
+
+    def _look_ahead(self, request: Request | None = None) -> None:
+        """Go through what is to come on a copy, in the thread that asks."""
+        if self._foresee is None:
+            return
+        copy = Transitions()
+        with self._lock:
+            tasks = {id(member.task): member.task for member in self._members.values()}
+            copy._members = deepcopy(self._members, tasks)
+            copy._queue = list(self._queue)
+            copy._now, copy._period = self._now, self._period
+        if request is not None:
+            copy._add(request)
+        self._foresee(copy._to_come())
+
+    def _to_come(self) -> Iterator[tuple[Member, ...]]:
+        """Go from event to event; each answer holds until the next one is asked for."""
+        t = (self._now or 0.0) + self._period
+        for _ in range(AHEAD):
+            self._start_due(t)
+            self._settle(t)
+            yield tuple(self._members.values())
+            self._now, t = t, self._next
+            if t == math.inf:
+                return
+
+    def _start_due(self, t: float) -> bool:
         before = self._now
         start = -math.inf
         waiting: list[_Queued] = []
@@ -153,28 +201,48 @@ class Transitions:
             on_time = wanted is not None and before is not None and wanted > before
             start = max(start, wanted if wanted is not None and on_time else t)
             request.apply(self._members, start)
+        started = len(waiting) < len(self._queue)
         self._queue = waiting
+        return started
 
-    def _tidy(self, t: float) -> None:
-        for name, member in list(self._members.items()):
-            if member.gone(t):
-                del self._members[name]
-            elif len(member.places) > 1:
-                member.tidy(t)
+    def _settle(self, t: float) -> bool:
+        """Drop what has left, and find when the next request is due or the next ramp arrives.
 
-    def _next_event(self, t: float) -> float:
-        """Return the time at which the next request is due or the next ramp arrives, s."""
-        due = [q.request.timing.start_time or -math.inf for q in self._queue]
-        ramps = [
-            variable.ramp.start_time + variable.ramp.duration
-            for member in self._members.values()
-            for variable in (member.presence, *(place.arrival for place in member.places))
-            if variable is not None and not variable.arrived(t)
-        ]
-        return min([*due, *ramps], default=math.inf)
+        One pass, for the tick that does it has other work to do.
+
+        Returns:
+            Whether a task or a place of one is gone.
+        """
+        gone: list[str] = []
+        tidied = False
+        following = math.inf
+        for name, member in self._members.items():
+            ramp = member.presence.ramp
+            end = ramp.start_time + ramp.duration
+            if t < end and ramp.duration != 0.0:
+                following = min(following, end)
+            elif ramp.target == 0.0:
+                gone.append(name)
+                continue
+            if len(member.places) > 1:
+                tidied = member.tidy(t) or tidied
+                for place in member.places[1:]:
+                    assert place.arrival is not None
+                    ramp = place.arrival.ramp
+                    following = min(following, ramp.start_time + ramp.duration)
+        for name in gone:
+            del self._members[name]
+        for queued in self._queue:
+            start = queued.request.timing.start_time
+            following = min(following, -math.inf if start is None else start)
+        self._next = following
+        return tidied or bool(gone)
 
     def _waiting(self) -> list[Task]:
         return [q.request.task for q in self._queue if isinstance(q.request, Insert)]
+
+    def _add(self, request: Request) -> None:
+        insort(self._queue, self._checked(request), key=lambda queued: queued.order)
 
     def _checked(self, request: Request) -> _Queued:
         """Go through everything that is asked, in the order in which it will happen."""

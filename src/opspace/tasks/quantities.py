@@ -75,7 +75,7 @@ class Orientation:
     speed_groups: tuple[slice, ...] = (slice(None),)
 
     def __init__(self) -> None:
-        self._error = RotationError()
+        self.turn = RotationError()
 
     def check(self, value: ArrayLike, what: str) -> Array:
         """Return a rotation matrix from one or from a quaternion wxyz."""
@@ -87,11 +87,11 @@ class Orientation:
 
     def error(self, motion: Motion, desired: Array) -> Array:
         """Return the rotation vector from R to R_d, rad."""
-        return self._error(desired @ motion.rotation.T)
+        return self.turn(desired @ motion.rotation.T)
 
     def reset(self) -> None:
         """Forget which way round the error went."""
-        self._error.reset()
+        self.turn.reset()
 
 
 class Pose:
@@ -103,6 +103,7 @@ class Pose:
 
     def __init__(self) -> None:
         self._orientation = Orientation()
+        self.turn = self._orientation.turn
 
     def check(self, value: ArrayLike, what: str) -> Array:
         """Return the (4, 4) matrix of a pose in any of the accepted forms."""

@@ -15,10 +15,13 @@ class RotationError:
     follows the unit quaternion of the error continuously instead: an error that grows past π goes
     on growing about the same axis up to π + ``BRANCH_HOLD`` and takes the short way only then.
     Below π and without a past it is the plain logarithm.
+
+    Attributes:
+        previous: Quaternion wxyz of the last error, None without a past.
     """
 
     def __init__(self) -> None:
-        self._previous: Quaternion | None = None
+        self.previous: Quaternion | None = None
 
     def __call__(self, E: Array) -> Array:
         """Return the rotation vector of the error E = R_d Rᵀ.
@@ -30,14 +33,14 @@ class RotationError:
             (3,) rotation vector, rad.
         """
         q = quaternion_from_matrix(E)
-        previous = self._previous
+        previous = self.previous
         if previous is not None:
             agreement = sum(a * b for a, b in zip(q, previous, strict=True))
             if goes_on(agreement, q[0]):
                 q = (-q[0], -q[1], -q[2], -q[3])
-        self._previous = q
+        self.previous = q
         return rotation_vector(q)
 
     def reset(self) -> None:
         """Forget the past: the next error takes the short way."""
-        self._previous = None
+        self.previous = None
