@@ -13,6 +13,7 @@ from opspace.command import Command, Status
 from opspace.controller.batch import Batch, check_members, checked_states, cores
 from opspace.controller.disturbance import DisturbanceObserver
 from opspace.controller.reference import ReferenceController
+from opspace.controller.stages import sum_of_hard_torques
 from opspace.controller.warm_up import compiled_batch, compiled_tick, tick_entry
 from opspace.controller.watchdog import Timing
 from opspace.errors import InputError
@@ -37,7 +38,7 @@ from opspace.robots.adapter import AdapterBase
 from opspace.robots.bodies import make_dynamics
 from opspace.robots.motion_axes import MotionAxes
 from opspace.robots.rigid_model import RigidModel
-from opspace.stack import Member
+from opspace.stack import Blending, Member
 from opspace.tasks.task import CHANGES
 from opspace.tasks.validation import finite, numbers
 
@@ -215,6 +216,8 @@ class Controller(ReferenceController):
 
     def _compiled_robot(self) -> MotionAxes | None:
         """Give the robot's arrays: computed by compiled code where it can, else by its library."""
+        if self._rules.law is not sum_of_hard_torques or type(self._blending) is not Blending:
+            return None
         robot = self.robot
         axes = robot.motion_axes() if isinstance(robot, AdapterBase) else None
         if axes is None or not isinstance(robot, AdapterBase):

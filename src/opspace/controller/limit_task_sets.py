@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,6 +10,7 @@ import numpy as np
 from opspace.law import Buffer, Profile, TaskSet
 from opspace.law.scalars import rises
 from opspace.tasks import JointLimits
+from opspace.tasks.joint_limits import Side
 
 TOP = -1
 """Priority of joint limits: above every level of the stack."""
@@ -20,15 +21,15 @@ class LimitTerms:
     """One limit in one tick, with accelerations counted towards the limit.
 
     Attributes:
-        name: "joint/side".
-        index: Velocity coordinate.
+        side: The limit.
+        index: Its velocity coordinate.
         sign: +1 for an upper limit, −1 for a lower one.
         command: Acceleration that the task set asks for, rad/s².
         activation: Activation by position (mode ``buffer``); 0 in mode ``admissible``.
         margin: Width of the activation's rise on a_other, rad/s²; 0 in mode ``buffer``.
     """
 
-    name: str
+    side: Side
     index: int
     sign: float
     command: float
@@ -61,13 +62,13 @@ def limit_terms(
             command, inner, outer = limits.pull_back(side, position, speed)
             distance = side.sign * (side.limit - position)
             h = Buffer(inner, outer, limits.profile)(distance).value
-            terms.append(LimitTerms(side.name, side.index, side.sign, command, h, 0.0))
+            terms.append(LimitTerms(side, side.index, side.sign, command, h, 0.0))
         else:
             command = limits.admissible(side, position, speed)
             if disturbance is not None:
                 command -= side.sign * float(disturbance[side.index])
             margin = limits.margin(side)
-            terms.append(LimitTerms(side.name, side.index, side.sign, command, 0.0, margin))
+            terms.append(LimitTerms(side, side.index, side.sign, command, 0.0, margin))
     return terms
 
 
@@ -85,11 +86,11 @@ class Insertion:
 
 
 def insertions(
-    terms: list[LimitTerms],
+    terms: Sequence[LimitTerms],
     profile: str,
     acceleration: np.ndarray,
-    known: Mapping[str, Insertion],
-) -> dict[str, Insertion]:
+    known: Mapping[int, Insertion],
+) -> dict[int, Insertion]:
     """Decide which limits take part, for the accelerations that the stack would now cause.
 
     In mode ``admissible`` a limit asks for the smaller of what is admissible and what the joint does
@@ -102,43 +103,45 @@ def insertions(
         terms: Every limit.
         profile: Name of the activation profile.
         acceleration: (n,) joint accelerations under the stack with the insertions known so far.
-        known: Insertions so far, by name.
+        known: Insertions so far, by index of the limit.
 
     Returns:
-        The insertions with an activation above 0, by name.
+        The insertions with an activation above 0, by index of the limit.
     """
     shape = Profile(profile)
-    found: dict[str, Insertion] = {}
-    for term in terms:
+    found: dict[int, Insertion] = {}
+    for i, term in enumerate(terms):
         if term.margin == 0.0:
             insertion = Insertion(term.activation, term.command)
         else:
-            before = known.get(term.name, Insertion(0.0, -np.inf))
             a_other = float(term.sign * acceleration[term.index])
-            h = shape((a_other - (term.command - term.margin)) / term.margin).value
+            needed = a_other - (term.command - term.margin)
+            if needed <= 0.0 and i not in known:
+                continue
+            before = known.get(i, Insertion(0.0, -np.inf))
+            h = shape(needed / term.margin).value
             desired = max(min(a_other, term.command), before.desired)
             insertion = Insertion(max(h, before.activation), desired)
             if not (rises(h, before.activation) or rises(desired, before.desired)):
                 insertion = before
         if insertion.activation > 0.0:
-            found[term.name] = insertion
+            found[i] = insertion
     return found
 
 
 def limit_task_sets(
-    terms: list[LimitTerms], inserted: Mapping[str, Insertion], n: int, sigma_reference: float
+    terms: Sequence[LimitTerms], inserted: Mapping[int, Insertion], n: int, sigma_reference: float
 ) -> list[TaskSet]:
     """Build the task sets e_jᵀ q̈ = ± desired of the limits that take part."""
     identity = np.eye(n)
     return [
         TaskSet(
-            identity[term.index : term.index + 1],
-            [term.sign * inserted[term.name].desired],
+            identity[terms[i].index : terms[i].index + 1],
+            [terms[i].sign * limit.desired],
             TOP,
-            inserted[term.name].activation,
-            term.name,
+            limit.activation,
+            terms[i].side.name,
             sigma_reference,
         )
-        for term in terms
-        if term.name in inserted
+        for i, limit in inserted.items()
     ]
