@@ -43,8 +43,8 @@ class ReferenceController:
         blending: How tasks that move at once are blended. ``"auto"`` (default): intermediate
             desired values while at most 3 move, the chain for those that begin to move beyond;
             ``"idv"``: up to 16 exactly, 2^k hard torques; ``"chain"``: k + 1; or a
-            `opspace.stack.Blending` of one's own. Joint limits, of which many may act at once, are always
-            blended by the chain.
+            `opspace.stack.Blending` of one's own. Joint limits, of which many may act at
+            once, are always blended by the chain.
         bias: ``"joint"`` (default) or ``"task"``, see `BIASES`.
         singularity: Buffer for singular directions; None switches their handling off.
         damping: Joint damping in the motions that no task uses, 1/s; also what a joint is braked

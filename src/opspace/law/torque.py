@@ -197,7 +197,7 @@ def intermediate_values(
 ) -> list[Float[np.ndarray, " _"]]:
     r"""Compute the intermediate desired values that make a stack's controller continuous.
 
-    Eq. 9, 12, 13, 18, 20 and 23:  f_k^i = h_k f̃_k + (1 − h_k) J_k A⁻¹ Γ*_k, where Γ*_k is the torque of
+    Eq. 9, Eq. 12, Eq. 13, Eq. 18, Eq. 20 and Eq. 23:  f_k^i = h_k f̃_k + (1 − h_k) J_k A⁻¹ Γ*_k, where Γ*_k is the torque of
     the stack without task set k, itself with intermediate desired values. A controller that treats
     every task set as fully present and is fed f^i instead of f̃ is continuous in the activations.
 
