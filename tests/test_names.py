@@ -11,7 +11,6 @@ SAME_CLASS: set[str] = set()
 SAME_FILE = {
     "__init__.py",
     "__main__.py",
-    # The readable law and the kernel of the same equation, each in its own package.
 }
 
 

@@ -10,7 +10,12 @@ from opspace.stack import Blending
 
 
 class Present(Blending):
-    """One stack: whatever is there at all is there fully, and a move has arrived when it begins."""
+    """One stack: whatever is there at all is there fully, and a move has arrived when it begins.
+
+    A task takes its directions at once; only the acceleration that it asks for fades.
+    """
+
+    fades_commands = True
 
     def corners(self, variables: Sequence[object], values: Sequence[float]) -> list[Weighted]:
         """See `opspace.stack.Blending`."""

@@ -2,129 +2,77 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from opspace.command import Command
-from opspace.compare.blendings import CrossFade, Present
 from opspace.compare.laws import (
     REGULARISATION,
     SOFTNESS,
     Inverse,
-    continuous_inverse,
-    damped_inverse,
     presences,
     stack_of_tasks,
     weighted_least_squares,
 )
 from opspace.controller import ReferenceController
-from opspace.law import LawInfo, TaskSet, Weighted, task_torque
-from opspace.stack import Member, Mixture
-from opspace.tasks import TaskTerms
+from opspace.controller.stages import Law, Question
+from opspace.law import LawInfo, task_torque
+from opspace.robots.protocol import Robot
+from opspace.stack import Blending, Stack
 
 MAX_RATE = 1000.0
 """Torque rate that the clamp lets through, N·m/s: 1 N·m per millisecond."""
 
 
-class CrossFadeController(ReferenceController):
-    """Linear cross-fade between the hard torques before and after each change."""
+def blended_by(make: Callable[[], Blending]) -> Callable[..., ReferenceController]:
+    """Make controllers with another blending than the one that the scenario names."""
 
-    def __init__(self, *args: Any, **options: Any) -> None:
-        super().__init__(*args, **options)
-        self._blending = CrossFade()
+    def controller(robot: Robot, stack: Stack, **options: Any) -> ReferenceController:
+        return ReferenceController(robot, stack, **{**options, "blending": make()})
 
-
-class GainRampController(ReferenceController):
-    """A task takes its directions at once; only the acceleration that it asks for fades."""
-
-    def __init__(self, *args: Any, **options: Any) -> None:
-        super().__init__(*args, **options)
-        self._blending = Present()
-
-    def _task_sets(
-        self,
-        members: Sequence[Member],
-        activations: Sequence[float],
-        terms: Sequence[TaskTerms],
-        mixed: Mixture,
-    ) -> tuple[list[TaskSet], Sequence[Weighted]]:
-        faded = [
-            replace(term, acceleration=h * term.acceleration)
-            for h, term in zip(activations, terms, strict=True)
-        ]
-        return super()._task_sets(members, activations, faded, mixed)
+    return controller
 
 
-class SoftWeightsController(ReferenceController):
+def soft_weights(asked: Question) -> tuple[np.ndarray, LawInfo]:
     """Weights in one least-squares problem instead of priorities; weights fade.
 
     A level weighs 100^(−number), so that one in between does not move the others.
     """
-
-    _numbers: tuple[float, ...] = ()
-
-    def _task_sets(
-        self,
-        members: Sequence[Member],
-        activations: Sequence[float],
-        terms: Sequence[TaskTerms],
-        mixed: Mixture,
-    ) -> tuple[list[TaskSet], Sequence[Weighted]]:
-        self._numbers = mixed.levels
-        return super()._task_sets(members, activations, terms, mixed)
-
-    def _weight(self, rank: int) -> float:
-        """Weight of a level by its rank: joint limits have −1, the damping of the rest the last."""
-        if rank >= len(self._numbers):
-            return REGULARISATION
-        number = -2.0 if rank < 0 else self._numbers[rank]
-        return SOFTNESS**-number
-
-    def _blend(
-        self, L: np.ndarray, sets: Sequence[TaskSet], blend: Sequence[Weighted]
-    ) -> tuple[np.ndarray, LawInfo]:
-        presence = presences(blend, len(sets))
-        weights = [h * self._weight(t.priority) for h, t in zip(presence, sets, strict=True)]
-        return weighted_least_squares(L, sets, weights), LawInfo(1, 1, ())
+    sets = asked.task_sets
+    weights = [
+        h * _weight(asked.levels, task.priority)
+        for h, task in zip(presences(asked.corners, len(sets)), sets, strict=True)
+    ]
+    return weighted_least_squares(asked.L, sets, weights), LawInfo(1, 1, ())
 
 
-class _StackOfTasksController(ReferenceController):
+def _weight(levels: Sequence[float], rank: int) -> float:
+    """Weight of a level by its rank: joint limits have −1, the damping of the rest the last."""
+    if rank >= len(levels):
+        return REGULARISATION
+    number = -2.0 if rank < 0 else levels[rank]
+    return SOFTNESS**-number
+
+
+def level_by_level(inverse: Inverse) -> Law:
     """Levels one after the other, each with a generalised inverse of its own."""
 
-    _inverse: Inverse
-
-    def _blend(
-        self, L: np.ndarray, sets: Sequence[TaskSet], blend: Sequence[Weighted]
-    ) -> tuple[np.ndarray, LawInfo]:
-        tau = stack_of_tasks(L, sets, presences(blend, len(sets)), self._inverse)
+    def law(asked: Question) -> tuple[np.ndarray, LawInfo]:
+        sets = asked.task_sets
+        tau = stack_of_tasks(asked.L, sets, presences(asked.corners, len(sets)), inverse)
         return tau, LawInfo(1, len({task.priority for task in sets}), ())
 
-
-class ContinuousInverseController(_StackOfTasksController):
-    """Mansard's continuous inverse at every level."""
-
-    _inverse = staticmethod(continuous_inverse)
+    return law
 
 
-class DampedController(_StackOfTasksController):
-    """Damped least squares at every level, for tasks that switch."""
-
-    _inverse = staticmethod(damped_inverse)
-
-
-class AsPrintedController(ReferenceController):
+def as_printed(asked: Question) -> tuple[np.ndarray, LawInfo]:
     """Eq. 15-23 to the letter, without the term that subtracts what higher levels do."""
-
-    def _blend(
-        self, L: np.ndarray, sets: Sequence[TaskSet], blend: Sequence[Weighted]
-    ) -> tuple[np.ndarray, LawInfo]:
-        presence = presences(blend, len(sets))
-        active = [task.replace(activation=h) for task, h in zip(sets, presence, strict=True)]
-        return task_torque(L @ L.T, active, coupling="as-printed", info=True)
+    presence = presences(asked.corners, len(asked.task_sets))
+    active = [t.replace(activation=h) for t, h in zip(asked.task_sets, presence, strict=True)]
+    return task_torque(asked.L @ asked.L.T, active, coupling="as-printed", info=True)
 
 
 class RateClampController(ReferenceController):

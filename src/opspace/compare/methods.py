@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from types import MappingProxyType
 from typing import Any
 
 from opspace.compare import controllers as others
+from opspace.compare.blendings import CrossFade, Present
+from opspace.compare.laws import continuous_inverse, damped_inverse
 from opspace.compare.tsid_controller import TsidController, tsid_installed
 from opspace.controller import Controller, ReferenceController
 from opspace.scenario import Scenario
@@ -20,7 +23,7 @@ class Method:
     Attributes:
         title: What it does.
         limits: What it does near joint limits and singular directions.
-        controller: Class of the controller.
+        controller: Makes the controller.
         changes: What it changes in a scenario.
         profile: Profile of every event; None leaves them as they are.
         installed: Whether the package that it needs is there.
@@ -28,7 +31,7 @@ class Method:
 
     title: str
     limits: str
-    controller: type[ReferenceController] = Controller
+    controller: Callable[..., ReferenceController] = Controller
     changes: Mapping[str, Any] = field(default_factory=dict[str, Any])
     profile: str | None = None
     installed: Callable[[], bool] = lambda: True
@@ -57,28 +60,28 @@ METHODS: Mapping[str, Method] = MappingProxyType(
         "cross-fade": Method(
             "linear cross-fade of the hard torques before and after each change",
             _FADE,
-            others.CrossFadeController,
+            others.blended_by(CrossFade),
             profile="linear",
         ),
         "gain-ramp": Method(
             "gains ramped from and to zero; the task's directions are taken at once",
             _FADE,
-            others.GainRampController,
+            others.blended_by(Present),
         ),
         "soft-weights": Method(
             "weighted least squares, weights ramped; 100 to 1 from level to level",
             _NO_BUFFER,
-            others.SoftWeightsController,
+            partial(ReferenceController, law=others.soft_weights),
         ),
         "continuous-inverse": Method(
             "Mansard's continuous inverse at every level",
             "joint limits fade; damping near singularities",
-            others.ContinuousInverseController,
+            partial(ReferenceController, law=others.level_by_level(continuous_inverse)),
         ),
         "damped": Method(
             "hard switch, damped least squares",
             "joint limits switch; damping near singularities",
-            others.DampedController,
+            partial(ReferenceController, law=others.level_by_level(damped_inverse)),
             {"method": "switch"},
         ),
         "rate-clamp": Method(
@@ -88,7 +91,9 @@ METHODS: Mapping[str, Method] = MappingProxyType(
             {"method": "switch"},
         ),
         "as-printed": Method(
-            "the paper's Eq. 15-23 to the letter", _NO_BUFFER, others.AsPrintedController
+            "the paper's Eq. 15-23 to the letter",
+            _NO_BUFFER,
+            partial(ReferenceController, law=others.as_printed),
         ),
         "tsid": Method(
             "TSID: one quadratic program, 100 to 1 from level to level, weights ramped",

@@ -11,7 +11,7 @@ from opspace.controller.limit_task_sets import LimitTerms
 from opspace.law import BROKEN, LOST, excess, nearest_acceleration
 
 
-def keep_bounds(
+def nearest_torque(
     terms: Sequence[LimitTerms],
     M: np.ndarray,
     bias: np.ndarray,

@@ -14,6 +14,7 @@ from opspace.command import Command, Status
 from opspace.controller.batch import Batch, check_members, checked_states, cores
 from opspace.controller.disturbance import DisturbanceObserver
 from opspace.controller.reference import ReferenceController
+from opspace.controller.stages import sum_of_hard_torques
 from opspace.controller.warm_up import compiled_batch, compiled_tick, tick_entry
 from opspace.controller.watchdog import Watchdog
 from opspace.errors import InputError
@@ -38,7 +39,7 @@ from opspace.robots.adapter import AdapterBase
 from opspace.robots.bodies import make_dynamics
 from opspace.robots.motion_axes import MotionAxes
 from opspace.robots.rigid_model import RigidModel
-from opspace.stack import Member
+from opspace.stack import Blending, Member
 from opspace.tasks.task import CHANGES
 from opspace.tasks.validation import finite, numbers
 
@@ -221,8 +222,8 @@ class Controller(ReferenceController):
 
     def _compiled_robot(self) -> MotionAxes | None:
         """Give the robot's arrays: computed by compiled code where it can, else by its library."""
-        robot, limits = self.robot, self.stack.limits
-        if limits is not None and limits.overridden:
+        robot = self.robot
+        if self._not_compiled():
             return None
         axes = robot.motion_axes() if isinstance(robot, AdapterBase) else None
         if axes is None or not isinstance(robot, AdapterBase):
@@ -232,13 +233,20 @@ class Controller(ReferenceController):
             return axes
         return model.motion_axes(make_dynamics(model.bodies), *robot.state)
 
-    def _batched(self, members: tuple[Member, ...], threads: int) -> Batch:
-        robot, limits = self.robot, self.stack.limits
+    def _not_compiled(self) -> str:
+        """Name what somebody wrote that compiled code cannot call, empty where there is nothing."""
+        limits = self.stack.limits
         if limits is not None and limits.overridden:
-            raise InputError(
-                f"joint limits of class {type(limits).__name__} have a law of their own, which a "
-                "batch cannot call; step() can"
-            )
+            return f"the law of {type(limits).__name__}"
+        if self._rules.law is not sum_of_hard_torques:
+            return "a law of one's own"
+        blending = type(self._blending)
+        return "" if blending is Blending else f"the blending {blending.__name__}"
+
+    def _batched(self, members: tuple[Member, ...], threads: int) -> Batch:
+        robot = self.robot
+        if own := self._not_compiled():
+            raise InputError(f"a batch cannot call {own}; step() can")
         if self._bodies is None and isinstance(robot, AdapterBase):
             self._bodies = robot.rigid_model()
         if self._bodies is None or not isinstance(robot, AdapterBase):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -75,10 +75,10 @@ class Insertion:
 
 def insertions(
     limits: JointLimits,
-    terms: list[LimitTerms],
+    terms: Sequence[LimitTerms],
     acceleration: np.ndarray,
-    known: Mapping[str, Insertion],
-) -> dict[str, Insertion]:
+    known: Mapping[int, Insertion],
+) -> dict[int, Insertion]:
     """Decide which limits take part, for the accelerations that the stack would now cause.
 
     In mode ``admissible`` a limit asks for the smaller of what is admissible and what the joint does
@@ -91,39 +91,37 @@ def insertions(
         limits: Their law.
         terms: Every limit.
         acceleration: (n,) joint accelerations under the stack with the insertions known so far.
-        known: Insertions so far, by name.
+        known: Insertions so far, by index of the limit.
 
     Returns:
-        The insertions with an activation above 0, by name.
+        The insertions with an activation above 0, by index of the limit.
     """
-    found: dict[str, Insertion] = {}
-    for term in terms:
+    found: dict[int, Insertion] = {}
+    for i, term in enumerate(terms):
         side = term.side
-        before = known.get(side.name, Insertion(0.0, -np.inf))
+        before = known.get(i, Insertion(0.0, -np.inf))
         other = float(side.sign * acceleration[side.index])
         h, desired = limits.presence(side, term.position, term.speed, other, term.command)
         h, desired = max(h, before.activation), max(desired, before.desired)
-        if not (rises(h, before.activation) or rises(desired, before.desired)):
-            h, desired = before.activation, before.desired
         if h > 0.0:
-            found[side.name] = Insertion(h, desired)
+            new = rises(h, before.activation) or rises(desired, before.desired)
+            found[i] = Insertion(h, desired) if new else before
     return found
 
 
 def limit_task_sets(
-    terms: list[LimitTerms], inserted: Mapping[str, Insertion], n: int, sigma_reference: float
+    terms: Sequence[LimitTerms], inserted: Mapping[int, Insertion], n: int, sigma_reference: float
 ) -> list[TaskSet]:
     """Build the task sets e_jᵀ q̈ = ± desired of the limits that take part."""
     identity = np.eye(n)
     return [
         TaskSet(
-            identity[term.side.index : term.side.index + 1],
-            [term.side.sign * inserted[term.side.name].desired],
+            identity[terms[i].side.index : terms[i].side.index + 1],
+            [terms[i].side.sign * limit.desired],
             TOP,
-            inserted[term.side.name].activation,
-            term.side.name,
+            limit.activation,
+            terms[i].side.name,
             sigma_reference,
         )
-        for term in terms
-        if term.side.name in inserted
+        for i, limit in inserted.items()
     ]

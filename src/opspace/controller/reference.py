@@ -1,4 +1,4 @@
-"""One tick of operational space control in readable form: state in, torque and diagnostics out."""
+"""Operational space control in readable form: a state in, torque and diagnostics out."""
 
 from __future__ import annotations
 
@@ -9,35 +9,17 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from opspace.command import Command, Found, Status
-from opspace.controller.bounds import keep_bounds
 from opspace.controller.disturbance import DisturbanceObserver
 from opspace.controller.drivable import check_drivable
 from opspace.controller.handover import Handover
-from opspace.controller.limit_task_sets import (
-    Insertion,
-    insertions,
-    limit_task_sets,
-    limit_terms,
-)
-from opspace.controller.reference_report import level_status, task_status
+from opspace.controller.stages import Given, Law, Rules, sum_of_hard_torques, tick
 from opspace.controller.watchdog import Watchdog
 from opspace.errors import InputError, unknown_name
-from opspace.law import (
-    LawInfo,
-    Motors,
-    Profile,
-    TaskSet,
-    Weighted,
-    blended_torque,
-    combined,
-    corners,
-)
-from opspace.law.scalars import LIMIT_PASSES, SCALED
+from opspace.law import Profile
 from opspace.plan.scales import DEFAULT_SINGULARITY, Scales, Singularity
 from opspace.robots.protocol import Robot
-from opspace.stack import Blending, Member, Mixture, Stack, mixture
-from opspace.tasks import JointLimits, PostureTask, TaskTerms, TrackingTask
-from opspace.tasks.activations import own_activation
+from opspace.stack import Blending, Member, Stack
+from opspace.tasks import JointLimits
 from opspace.tasks.validation import finite, numbers
 
 BIASES = ("joint", "task")
@@ -60,9 +42,9 @@ class ReferenceController:
         stack: The tasks; they may come, go and change rank while the controller runs.
         blending: How tasks that move at once are blended. ``"auto"`` (default): intermediate
             desired values while at most 3 move, the chain for those that begin to move beyond;
-            ``"idv"``: up to 16 exactly, 2^k hard torques; ``"chain"``: k + 1. See
-            `opspace.stack.Blending`. Joint limits, of which many may act at once, are always
-            blended by the chain.
+            ``"idv"``: up to 16 exactly, 2^k hard torques; ``"chain"``: k + 1; or a
+            `opspace.stack.Blending` of one's own. Joint limits, of which many may act at
+            once, are always blended by the chain.
         bias: ``"joint"`` (default) or ``"task"``, see `BIASES`.
         singularity: Buffer for singular directions; None switches their handling off.
         damping: Joint damping in the motions that no task uses, 1/s; also what a joint is braked
@@ -72,6 +54,8 @@ class ReferenceController:
             ones are then reported in the status. None watches nothing.
         on_time_jump: What happens when time runs backwards or jumps, see
             `opspace.controller.watchdog.POLICIES`; it needs ``period``.
+        law: Torque of task sets, to compare with the library's own; see
+            `opspace.controller.stages.Question` for what it is asked.
 
     Raises:
         InputError: The robot is not fully actuated, or an option cannot be used.
@@ -83,15 +67,16 @@ class ReferenceController:
         robot: Robot,
         stack: Stack,
         *,
-        blending: str = "auto",
+        blending: str | Blending = "auto",
         bias: str = "joint",
         singularity: Singularity | None = DEFAULT_SINGULARITY,
         damping: float = 10.0,
         torque_limits: str = "report",
         period: float | None = None,
         on_time_jump: str = "report",
+        law: Law = sum_of_hard_torques,
     ) -> None:
-        self._blending = Blending(blending)
+        self._blending = blending if isinstance(blending, Blending) else Blending(blending)
         if bias not in BIASES:
             raise unknown_name("bias", bias, BIASES)
         if torque_limits not in TORQUE_LIMITS:
@@ -117,7 +102,6 @@ class ReferenceController:
         if period is None and on_time_jump != "report":
             raise InputError(f"on_time_jump={on_time_jump!r} needs the period of the ticks")
         self._timing = None if period is None else Watchdog(period, on_time_jump)
-        self._motors: Motors | None = None
         self._scales = Scales(robot, singularity)
         stack.attach(self._scales.prepare)
         self.calibration = self._scales.calibration(list(stack))
@@ -125,6 +109,16 @@ class ReferenceController:
             stack.limits.bind(robot, self.calibration.brake)
         self._handover: Handover | None = None
         self._observer = _observer(stack.limits, robot.nv, torque_limits)
+        self._rules = Rules(
+            law,
+            self._blending,
+            bias,
+            self.damping,
+            torque_limits == "priority",
+            self._scales,
+            stack.limits,
+            self._observer,
+        )
 
     def __repr__(self) -> str:
         handled = "off" if self.singularity is None else repr(self.singularity)
@@ -221,155 +215,16 @@ class ReferenceController:
 
     def _answer(self, t: float, members: Sequence[Member], timing: Status) -> Command:
         """Compute the torque of these tasks for the robot's present state."""
-        robot = self.robot
-        activations = [self._activation(member, t) for member in members]
-        terms = [member.task.evaluate(robot, t) for member in members]
-        mixed = mixture(members, activations, t, self._blending)
-        if not self._usable(members, terms):
+        r = self.robot
+        given = Given(self._rules, t, members, r, r.q, r.v, r.M, r.bias, r.torque_limit)
+        answer = tick(given)
+        if answer is None:
             return self._hold(t, timing | Status.FAULT)
-        task_sets, blend = self._task_sets(members, activations, terms, mixed)
-        try:
-            tau, info, limits, kept = self._torque(t, task_sets, blend)
-        except (InputError, np.linalg.LinAlgError):
-            # Everything that went in is finite: these numbers are too large to compute with.
-            return self._hold(t, timing | Status.FAULT)
-        tau, status = self._checked(tau, limits)
-        status |= timing | kept
-        if any(level.scale < 1.0 - SCALED for level in info.levels):
-            status |= Status.TORQUE_SCALED
-        levels = level_status(members, mixed, info, len(limits))
-        if any(np.any(level.activation < 1.0) for level in levels):
-            status |= Status.DIRECTION_OFF
-        tasks = task_status(members, activations, terms, mixed)
-        command = Command(t, tau, status, info.hard_solves, Found(tasks, levels, limits))
+        tau, status, hard_solves, found = answer
+        if Status.FAULT in status:
+            tau = self._braking()
+        command = Command(t, tau, status | timing, hard_solves, found)
         return command if self._handover is None else self._handed_over(command)
-
-    def _usable(self, members: Sequence[Member], terms: Sequence[TaskTerms]) -> bool:
-        """Whether the model and the library's own tasks are finite, and the inertia an inertia."""
-        robot = self.robot
-        numbers = [robot.M, robot.bias]
-        for member, term in zip(members, terms, strict=True):
-            if isinstance(member.task, TrackingTask):
-                numbers += [term.J, term.drift, term.acceleration]
-        if not all(np.isfinite(array).all() for array in numbers):
-            return False
-        return bool(np.linalg.eigvalsh(robot.M)[0] > 0.0)
-
-    def _activation(self, member: Member, t: float) -> float:
-        """Presence in the stack times the task's own activation."""
-        presence = member.presence.value(t)
-        return presence * own_activation(member.task, self.robot, t)
-
-    def _task_sets(
-        self,
-        members: Sequence[Member],
-        activations: Sequence[float],
-        terms: Sequence[TaskTerms],
-        mixed: Mixture,
-    ) -> tuple[list[TaskSet], Sequence[Weighted]]:
-        """J q̈ = f̃ for every task, f̃ = f* − J̇ q̇ (Eq. 3), and damping of what is left."""
-        rank = {level: k for k, level in enumerate(mixed.levels)}
-        sets = [
-            TaskSet(
-                terms[i].J,
-                terms[i].acceleration - terms[i].drift,
-                rank[level],
-                1.0,
-                members[i].task.name,
-                self._scales.reference(members[i].task),
-            )
-            for i, level in mixed.slots
-        ]
-        covered = any(
-            isinstance(member.task, PostureTask) and member.task.rows == self.robot.nv and h == 1.0
-            for member, h in zip(members, activations, strict=True)
-        )
-        if covered or self.damping == 0.0:
-            return sets, mixed.corners
-        # q̈ = −d v of what is left, weighed by the inertia: its momentum decays at the rate d. A
-        # posture on its way in takes everything away from it, so it need not fade.
-        L = np.linalg.cholesky(self.robot.M)
-        rest = -self.damping * (L.T @ self.robot.v)
-        sets.append(TaskSet(L.T, rest, len(rank), 1.0, "damping", self._scales.unit))
-        last = len(sets) - 1
-        return sets, [Weighted(w, present | {last}) for w, present in mixed.corners]
-
-    def _torque(
-        self, t: float, tasks: list[TaskSet], blend: Sequence[Weighted]
-    ) -> tuple[np.ndarray, LawInfo, dict[str, float], Status]:
-        """The law (Eq. 19-23), with the joint limits that its own answer calls for."""
-        L = np.linalg.cholesky(self.robot.M)
-        tau, info = self._law(L, [], tasks, blend)
-        limits = self.stack.limits
-        if limits is None:
-            return tau, info, {}, Status.OK
-        robot = self.robot
-        observer = self._observer
-        if observer is not None:
-            observer.observe(t, robot.v)
-        terms = limit_terms(limits, robot.q, robot.v, observer and observer.acceleration)
-        inserted: dict[str, Insertion] = {}
-        for _ in range(LIMIT_PASSES):
-            acceleration = self._acceleration(tau)
-            again = insertions(limits, terms, acceleration, inserted)
-            if again == inserted:
-                break
-            inserted = again
-            sets = limit_task_sets(terms, inserted, robot.nv, self._scales.joint)
-            tau, info = self._law(L, sets, tasks, blend)
-        kept = Status.OK
-        if limits.law.bound:
-            motors = robot.torque_limit if self.torque_limits == "priority" else None
-            tau, kept = keep_bounds(terms, robot.M, robot.bias, tau, motors)
-        if observer is not None:
-            observer.remember(t, robot.v, self._acceleration(tau))
-        return tau, info, {name: limit.activation for name, limit in inserted.items()}, kept
-
-    def _law(
-        self,
-        L: np.ndarray,
-        limits: list[TaskSet],
-        tasks: list[TaskSet],
-        blend: Sequence[Weighted],
-    ) -> tuple[np.ndarray, LawInfo]:
-        """Joint torque of limits and tasks, bias included as the option says."""
-        robot = self.robot
-        sets = [*limits, *tasks]
-        if self.bias == "task":
-            # Eq. 3-4: f̃ = f* + η + ζ, the bias as an acceleration of each task.
-            drop = np.linalg.solve(robot.M, robot.bias)
-            sets = [task.replace(f=task.f + task.J @ drop) for task in sets]
-        # Many joints can be near a limit at once: k + 1 corners for them, not 2^k.
-        first = len(limits)
-        everything = combined(
-            corners([task.activation for task in limits], "chain"),
-            [Weighted(w, frozenset(first + k for k in present)) for w, present in blend],
-        )
-        self._motors = self._limited_motors(L)
-        tau, info = self._blend(L, sets, everything)
-        if self._motors is not None:
-            return self._motors.start + tau, info
-        return (tau if self.bias == "task" else tau + robot.bias), info
-
-    def _limited_motors(self, L: np.ndarray) -> Motors | None:
-        """What the motors can give beside the bias, or None where they are not asked."""
-        if self.torque_limits != "priority":
-            return None
-        limit = self.robot.torque_limit
-        bias = np.zeros(limit.size) if self.bias == "task" else self.robot.bias
-        return Motors(L, np.clip(bias, -limit, limit), limit)
-
-    def _blend(
-        self, L: np.ndarray, sets: Sequence[TaskSet], blend: Sequence[Weighted]
-    ) -> tuple[np.ndarray, LawInfo]:
-        """The sum of hard torques; another law may stand here to be compared with."""
-        return blended_torque(
-            L, sets, blend, self._scales.buffer, want_spectra=True, motors=self._motors
-        )
-
-    def _acceleration(self, tau: np.ndarray) -> np.ndarray:
-        """Joint accelerations that a torque causes, q̈ = A⁻¹ (Γ − b − g) (Eq. 1)."""
-        return np.linalg.solve(self.robot.M, tau - self.robot.bias)
 
     @property
     def _holds(self) -> bool:
@@ -387,19 +242,6 @@ class ReferenceController:
         tau = robot.bias - self.damping * robot.M.diagonal() * robot.v
         limit = np.minimum(robot.torque_limit, np.finfo(float).max)
         return np.clip(np.nan_to_num(tau, nan=0.0), -limit, limit)
-
-    def _checked(self, tau: np.ndarray, limits: dict[str, float]) -> tuple[np.ndarray, Status]:
-        """A torque that is finite, and what there is to say about it."""
-        robot = self.robot
-        status = Status.OK
-        if not np.all(np.isfinite(tau)):
-            tau = self._braking()
-            status |= Status.FAULT
-        if np.any(np.abs(tau) > robot.torque_limit):
-            status |= Status.ABOVE_TORQUE_LIMIT
-        if limits:
-            status |= Status.JOINT_LIMIT
-        return tau, status
 
 
 def _observer(limits: JointLimits | None, n: int, torque_limits: str) -> DisturbanceObserver | None:

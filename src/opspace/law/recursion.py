@@ -18,7 +18,7 @@ Outcome = Callable[[int, Float[np.ndarray, " n"]], Float[np.ndarray, " m"]]
 
 
 class Recursion:
-    """The recursion over subsets of Eq. 9, 12, 13, 18, 20 and 23, each subset solved once.
+    """The recursion over subsets, each solved once (Eq. 9, Eq. 12, Eq. 13, Eq. 18, Eq. 20, Eq. 23).
 
     f_k^i(S) = h_k f_k + (1 − h_k) J_k A⁻¹ Γ(S∖k)        Γ(S) = H(S; f^i(S))        Γ(∅) = H(∅)
 

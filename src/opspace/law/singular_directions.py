@@ -52,6 +52,8 @@ class SigmaBuffer:
 
     def activation(self, sigma: float) -> float:
         """Activation h(σ) of a direction, 0 below the buffer and 1 above."""
+        if not self.lower < sigma < self.upper:
+            return float(sigma >= self.upper)
         return Buffer(self.lower, self.upper, self.profile)(sigma).value
 
 

@@ -49,10 +49,12 @@ def sources() -> list[Path]:
 
 
 def _files(module: str, names: list[str]) -> list[Path]:
-    """Files of a module, and of those of the names imported from it that are modules themselves."""
+    """Files that an import takes names from: those that are modules themselves, or else the module's."""
     place = PACKAGE.joinpath(*module.split(".")[1:])
-    here = [place.with_suffix(".py"), place / "__init__.py"]
-    return [path for path in (*here, *(place / f"{name}.py" for name in names)) if path.is_file()]
+    parts = [place / f"{name}.py" for name in names]
+    if parts and all(path.is_file() for path in parts):
+        return parts
+    return [path for path in (place.with_suffix(".py"), place / "__init__.py") if path.is_file()]
 
 
 def stamp() -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -56,12 +56,12 @@ class Built:
         return {SCENARIO_KEY: to_dict(scenario), "seed": scenario.seed, "dt": scenario.dt}
 
 
-def build(scenario: Scenario, controller: type[ReferenceController] = Controller) -> Built:
+def build(scenario: Scenario, controller: Callable[..., ReferenceController] = Controller) -> Built:
     """Build what a scenario describes.
 
     Args:
         scenario: The scenario.
-        controller: Class of the controller.
+        controller: Makes the controller.
 
     Returns:
         The objects.

@@ -28,10 +28,14 @@ class Blending:
 
     Attributes:
         room: How many activations may be in the exact group.
+        fades_commands: Whether a task on its way asks for part of its acceleration, its activation
+            times f*; here it asks for all of it, in part of the stacks.
 
     Raises:
         UnknownNameError: There is no such blending.
     """
+
+    fades_commands = False
 
     def __init__(self, name: str = "auto") -> None:
         if name not in EXACT:

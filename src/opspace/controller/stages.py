@@ -1,0 +1,329 @@
+"""One tick as a list of named stages, the same names as in `opspace.kernels.tick`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from opspace.command import Found, Status
+from opspace.controller.bounds import nearest_torque
+from opspace.controller.disturbance import DisturbanceObserver
+from opspace.controller.limit_task_sets import (
+    Insertion,
+    LimitTerms,
+    insertions,
+    limit_task_sets,
+    limit_terms,
+)
+from opspace.controller.reference_report import level_status, task_status
+from opspace.errors import InputError
+from opspace.law import LawInfo, Motors, SigmaBuffer, TaskSet, Weighted, blended_torque, corners
+from opspace.law.blending import combined
+from opspace.law.scalars import LIMIT_PASSES, SCALED
+from opspace.plan.scales import Scales
+from opspace.robots.protocol import Robot
+from opspace.stack import Blending, Member, Mixture, mixture
+from opspace.tasks import JointLimits, PostureTask, TaskTerms, TrackingTask
+from opspace.tasks.activations import own_activation
+
+
+class Question(NamedTuple):
+    """What a law is asked in one tick.
+
+    Attributes:
+        L: (n, n) lower Cholesky factor of the inertia.
+        task_sets: Every task set that is in some corner, fully active: joint limits with the priority
+            −1, tasks with the rank of their level, damping of the rest with the last rank.
+        corners: Stacks as indices into ``task_sets``, with weights that sum to 1.
+        levels: Numbers of the levels by their rank.
+        buffer: Where singular directions fade; None for nowhere.
+        motors: Torque limits to stay inside of; None where they are not asked.
+    """
+
+    L: np.ndarray
+    task_sets: Sequence[TaskSet]
+    corners: Sequence[Weighted]
+    levels: Sequence[float]
+    buffer: SigmaBuffer | None
+    motors: Motors | None
+
+
+Law = Callable[[Question], tuple[np.ndarray, LawInfo]]
+"""A torque (n,), N·m, beside the bias and beside what ``motors`` starts with, and what it took."""
+
+
+def sum_of_hard_torques(asked: Question) -> tuple[np.ndarray, LawInfo]:
+    """Γ = Σ_T w_T H(T; f̃), the library's own law (Eq. 19-23)."""
+    L, task_sets, blend, _, buffer, motors = asked
+    return blended_torque(L, task_sets, blend, buffer, want_spectra=True, motors=motors)
+
+
+@dataclass(frozen=True)
+class Rules:
+    """What is the same in every tick, except for what ``blending`` and ``observer`` remember.
+
+    Attributes:
+        law: Torque of task sets.
+        blending: Stacks between which tasks are on their way.
+        bias: See `opspace.controller.reference.BIASES`.
+        damping: Of the motions that no task uses, 1/s.
+        keep_torque: Whether levels give way to the motors' limits.
+        scales: References of σ.
+        limits: Joint limits, None for none.
+        observer: Of what the model does not explain; None trusts the model.
+    """
+
+    law: Law
+    blending: Blending
+    bias: str
+    damping: float
+    keep_torque: bool
+    scales: Scales
+    limits: JointLimits | None
+    observer: DisturbanceObserver | None
+
+
+@dataclass(frozen=True)
+class Given:
+    """What one tick begins with; the stages read it and change nothing.
+
+    Attributes:
+        rules: What is the same in every tick.
+        t: Time, s.
+        members: The tasks.
+        robot: The robot, updated.
+        q: Configuration, (nq,).
+        v: (n,) velocity, rad/s.
+        M: (n, n) inertia.
+        bias: (n,) Coriolis, centrifugal and gravity torque, N·m.
+        torque_limit: (n,) what the motors give, N·m.
+    """
+
+    rules: Rules
+    t: float
+    members: Sequence[Member]
+    robot: Robot
+    q: np.ndarray
+    v: np.ndarray
+    M: np.ndarray
+    bias: np.ndarray
+    torque_limit: np.ndarray
+
+
+class Blend(NamedTuple):
+    """Task sets, and the stacks that are mixed of them as indices with weights."""
+
+    task_sets: Sequence[TaskSet]
+    corners: Sequence[Weighted]
+
+
+NO_LIMITS = Blend((), (Weighted(1.0, frozenset()),))
+
+
+class Answer(NamedTuple):
+    """Torque (n,), N·m, what happened, the number of hard torques and what there is to report."""
+
+    tau: np.ndarray
+    status: Status
+    hard_solves: int
+    found: Found
+
+
+def tick(k: Given) -> Answer | None:
+    """Compute the torque, or None where the model or its numbers cannot be computed with.
+
+    Raises:
+        InputError: A reference, an activation or a task of the user's own gave unusable numbers.
+    """
+    h = activations(k)
+    terms = evaluate_tasks(k)
+    mixed = blend(k, h)
+    L = factor(k, terms)
+    if L is None:
+        return None
+    tasks = whiten_tasks(k, h, terms, mixed, L)
+    inserted: Mapping[int, Insertion] = {}
+    bounds: list[LimitTerms] = []
+    try:
+        gamma, info = law(k, L, mixed, tasks, NO_LIMITS)
+        if k.rules.limits is not None:
+            bounds = begin_limits(k, k.rules.limits)
+            for _ in range(LIMIT_PASSES):
+                more = insert_limits(k, bounds, accelerations(k, torque(k, gamma)), inserted)
+                if more == inserted:
+                    break
+                inserted = more
+                gamma, info = law(k, L, mixed, tasks, limit_corners(k, bounds, inserted))
+        tau, kept = keep_bounds(k, bounds, torque(k, gamma))
+    except (InputError, np.linalg.LinAlgError):
+        # Everything that went in is finite: these numbers are too large to compute with.
+        return None
+    active = {bounds[i].side.name: limit.activation for i, limit in inserted.items()}
+    levels = level_status(k.members, mixed, info, len(active))
+    found = Found(task_status(k.members, h, terms, mixed), levels, active)
+    return Answer(tau, status(k, tau, found) | kept, info.hard_solves, found)
+
+
+def activations(k: Given) -> list[float]:
+    """Presence in the stack times the task's own activation."""
+    found: list[float] = []
+    for member in k.members:
+        h = member.presence.value(k.t)
+        if member.task.activation is not None:
+            h *= own_activation(member.task, k.robot, k.t)
+        found.append(h)
+    return found
+
+
+def evaluate_tasks(k: Given) -> list[TaskTerms]:
+    """J, J̇ q̇ and f* of every task (Eq. 24)."""
+    return [member.task.evaluate(k.robot, k.t) for member in k.members]
+
+
+def blend(k: Given, h: Sequence[float]) -> Mixture:
+    """Hard stacks between which the tasks are on their way, with their weights w_T."""
+    return mixture(k.members, h, k.t, k.rules.blending)
+
+
+def factor(k: Given, terms: Sequence[TaskTerms]) -> np.ndarray | None:
+    """A = L Lᵀ; None where the model or a task of the library is not finite, or A no inertia."""
+    numbers = [k.M, k.bias]
+    for member, term in zip(k.members, terms, strict=True):
+        if isinstance(member.task, TrackingTask):
+            numbers += [term.J, term.drift, term.acceleration]
+    if not all(np.isfinite(array).all() for array in numbers):
+        return None
+    try:
+        return np.linalg.cholesky(k.M) if np.linalg.eigvalsh(k.M)[0] > 0.0 else None
+    except np.linalg.LinAlgError:
+        return None
+
+
+def whiten_tasks(
+    k: Given, h: Sequence[float], terms: Sequence[TaskTerms], mixed: Mixture, L: np.ndarray
+) -> Blend:
+    """J q̈ = f̃ for every task, f̃ = f* − J̇ q̇ (Eq. 3), and damping of what is left.
+
+    What is whitened is left to the law, which does it to all rows at once.
+    """
+    members, rules = k.members, k.rules
+    rank = {level: i for i, level in enumerate(mixed.levels)}
+    fade = h if rules.blending.fades_commands else [1.0] * len(h)
+    sets = [
+        TaskSet(
+            terms[i].J,
+            fade[i] * terms[i].acceleration - terms[i].drift,
+            rank[level],
+            1.0,
+            members[i].task.name,
+            rules.scales.reference(members[i].task),
+        )
+        for i, level in mixed.slots
+    ]
+    covered = any(
+        isinstance(member.task, PostureTask) and member.task.rows == k.v.size and present == 1.0
+        for member, present in zip(members, h, strict=True)
+    )
+    if covered or rules.damping == 0.0:
+        return Blend(sets, mixed.corners)
+    # q̈ = −d v of what is left, weighed by the inertia: its momentum decays at the rate d. A
+    # posture on its way in takes everything away from it, so it need not fade.
+    rest = -rules.damping * (L.T @ k.v)
+    sets.append(TaskSet(L.T, rest, len(rank), 1.0, "damping", rules.scales.unit))
+    last = len(sets) - 1
+    return Blend(sets, [Weighted(w, present | {last}) for w, present in mixed.corners])
+
+
+def law(
+    k: Given, L: np.ndarray, mixed: Mixture, tasks: Blend, limits: Blend
+) -> tuple[np.ndarray, LawInfo]:
+    """Γ_tasks of the stacks, under the joint limits that take part (Eq. 19-23)."""
+    rules = k.rules
+    sets = [*limits.task_sets, *tasks.task_sets]
+    if rules.bias == "task":
+        # Eq. 3-4: f̃ = f* + η + ζ, the bias as an acceleration of each task.
+        drop = np.linalg.solve(k.M, k.bias)
+        sets = [task.replace(f=task.f + task.J @ drop) for task in sets]
+    first = len(limits.task_sets)
+    shifted = [Weighted(w, frozenset(first + i for i in here)) for w, here in tasks.corners]
+    everything = combined(limits.corners, shifted)
+    motors = Motors(L, start_inside(k), k.torque_limit) if rules.keep_torque else None
+    return rules.law(Question(L, sets, everything, mixed.levels, rules.scales.buffer, motors))
+
+
+def start_inside(k: Given) -> np.ndarray:
+    """Begin with the bias where it is compensated at every joint, cut at the motors' limits."""
+    bias = np.zeros(k.bias.size) if k.rules.bias == "task" else k.bias
+    return np.clip(bias, -k.torque_limit, k.torque_limit)
+
+
+def begin_limits(k: Given, limits: JointLimits) -> list[LimitTerms]:
+    """q̈_adm of every joint limit, without what the model does not explain."""
+    observer = k.rules.observer
+    if observer is not None:
+        observer.observe(k.t, k.v)
+    return limit_terms(limits, k.q, k.v, observer and observer.acceleration)
+
+
+def accelerations(k: Given, tau: np.ndarray) -> np.ndarray:
+    """q̈ = A⁻¹ (Γ − b − g) (Eq. 1)."""
+    return np.linalg.solve(k.M, tau - k.bias)
+
+
+def insert_limits(
+    k: Given, bounds: Sequence[LimitTerms], acceleration: np.ndarray, known: Mapping[int, Insertion]
+) -> Mapping[int, Insertion]:
+    """Limits that the accelerations of the stack call for."""
+    assert k.rules.limits is not None
+    return insertions(k.rules.limits, bounds, acceleration, known)
+
+
+def limit_corners(
+    k: Given, bounds: Sequence[LimitTerms], inserted: Mapping[int, Insertion]
+) -> Blend:
+    """Task sets of the limits that take part, and the corners of their chain.
+
+    Many joints can be near a limit at once: m + 1 corners for m of them, not 2^m.
+    """
+    sets = limit_task_sets(bounds, inserted, k.v.size, k.rules.scales.joint)
+    return Blend(sets, corners([task.activation for task in sets], "chain"))
+
+
+def torque(k: Given, gamma: np.ndarray) -> np.ndarray:
+    """Γ = Γ_tasks + b + g (Eq. 4), the bias as far as the motors give it."""
+    if k.rules.keep_torque:
+        return start_inside(k) + gamma
+    return gamma if k.rules.bias == "task" else gamma + k.bias
+
+
+def keep_bounds(
+    k: Given, bounds: Sequence[LimitTerms], tau: np.ndarray
+) -> tuple[np.ndarray, Status]:
+    """No joint accelerates more than it may, whatever the task sets of the limits could do."""
+    limits, observer = k.rules.limits, k.rules.observer
+    kept = Status.OK
+    if limits is not None and limits.law.bound:
+        motors = k.torque_limit if k.rules.keep_torque else None
+        tau, kept = nearest_torque(bounds, k.M, k.bias, tau, motors)
+    if observer is not None:
+        observer.remember(k.t, k.v, accelerations(k, tau))
+    return tau, kept
+
+
+def status(k: Given, tau: np.ndarray, found: Found) -> Status:
+    """What happened."""
+    bits = Status.OK
+    if not np.all(np.isfinite(tau)):
+        bits |= Status.FAULT
+    elif np.any(np.abs(tau) > k.torque_limit):
+        bits |= Status.ABOVE_TORQUE_LIMIT
+    if found.limits:
+        bits |= Status.JOINT_LIMIT
+    if any(level.scale < 1.0 - SCALED for level in found.levels):
+        bits |= Status.TORQUE_SCALED
+    if any(np.any(level.activation < 1.0) for level in found.levels):
+        bits |= Status.DIRECTION_OFF
+    return bits
