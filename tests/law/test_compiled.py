@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from opspace.kernels.algebra import cholesky, singular_values
+from opspace.kernels.compiled_scalars import profile, ramp
 from opspace.kernels.corners import sort_corners
-from opspace.kernels.scalars import profile, ramp
 from opspace.kernels.walk import begin, pass_on, slot_bit, walk
 from opspace.law import SigmaBuffer, TaskSet, blended_torque, corners
 from opspace.law.activation import PROFILES, Profile, Ramp

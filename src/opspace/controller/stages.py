@@ -164,7 +164,7 @@ def tick(k: Given) -> Answer | None:
     active = {bounds[i].side.name: limit.activation for i, limit in inserted.items()}
     levels = level_status(k.members, mixed, info, len(active))
     found = Found(task_status(k.members, h, terms, mixed), levels, active)
-    return Answer(tau, status(k, tau, found) | kept, info.hard_solves, found)
+    return Answer(tau, status(k, tau, info, found) | kept, info.hard_solves, found)
 
 
 def activations(k: Given) -> list[float]:
@@ -313,7 +313,7 @@ def keep_bounds(
     return tau, kept
 
 
-def status(k: Given, tau: np.ndarray, found: Found) -> Status:
+def status(k: Given, tau: np.ndarray, info: LawInfo, found: Found) -> Status:
     """What happened."""
     bits = Status.OK
     if not np.all(np.isfinite(tau)):
@@ -322,7 +322,7 @@ def status(k: Given, tau: np.ndarray, found: Found) -> Status:
         bits |= Status.ABOVE_TORQUE_LIMIT
     if found.limits:
         bits |= Status.JOINT_LIMIT
-    if any(level.scale < 1.0 - SCALED for level in found.levels):
+    if any(level.scale < 1.0 - SCALED for level in info.levels):
         bits |= Status.TORQUE_SCALED
     if any(np.any(level.activation < 1.0) for level in found.levels):
         bits |= Status.DIRECTION_OFF

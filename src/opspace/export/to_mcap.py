@@ -28,7 +28,7 @@ ALONE = "tick"
 _ROWS_AT_ONCE = 500
 
 
-class Field(NamedTuple):
+class MessageField(NamedTuple):
     """A column in the messages of a topic.
 
     Attributes:
@@ -77,7 +77,7 @@ def write(recording: Recording, path: Path) -> Iterator[tuple[int, int]]:
     yield len(recording), len(recording)
 
 
-def topics_of(columns: Sequence[Column]) -> dict[str, list[Field]]:
+def topics_of(columns: Sequence[Column]) -> dict[str, list[MessageField]]:
     """Sort columns into topics.
 
     Args:
@@ -86,23 +86,25 @@ def topics_of(columns: Sequence[Column]) -> dict[str, list[Field]]:
     Returns:
         By topic, such as ``/tau`` or ``/tasks/position``, its fields.
     """
-    topics: dict[str, list[Field]] = {}
+    topics: dict[str, list[MessageField]] = {}
     for number, column in enumerate(columns):
         parts = (ALONE, column.name) if "/" not in column.name else tuple(column.name.split("/"))
         depth = 2 if parts[0] in OF_GROUPS and len(parts) > 2 else 1
         fields = topics.setdefault("/" + "/".join(parts[:depth]), [])
-        fields.append(Field(parts[depth:], number))
+        fields.append(MessageField(parts[depth:], number))
     return topics
 
 
-def _channel(writer: Writer, topic: str, fields: Sequence[Field], columns: Sequence[Column]) -> int:
+def _channel(
+    writer: Writer, topic: str, fields: Sequence[MessageField], columns: Sequence[Column]
+) -> int:
     name = "opspace." + topic[1:].replace("/", ".")
     described = json.dumps(_schema(name, fields, columns), ensure_ascii=False).encode()
     schema = writer.register_schema(name, SchemaEncoding.JSONSchema, described)
     return writer.register_channel(topic, MessageEncoding.JSON, schema)
 
 
-def _schema(name: str, fields: Sequence[Field], columns: Sequence[Column]) -> dict[str, Any]:
+def _schema(name: str, fields: Sequence[MessageField], columns: Sequence[Column]) -> dict[str, Any]:
     """Describe the messages of a topic; every field says its unit."""
     schema = {"title": name, "type": "object", "properties": {}}
     for keys, number in fields:
@@ -125,7 +127,7 @@ def _clash(column: Column) -> InputError:
     return InputError(f"column {column.name!r} cannot be told from a group in JSON")
 
 
-def _message(fields: Sequence[Field], row: Sequence[float]) -> dict[str, Any]:
+def _message(fields: Sequence[MessageField], row: Sequence[float]) -> dict[str, Any]:
     message: dict[str, Any] = {}
     for keys, number in fields:
         value = row[number]

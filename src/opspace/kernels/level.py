@@ -15,7 +15,7 @@ from opspace.kernels.algebra import (
     solve_upper,
     solve_upper_transposed,
 )
-from opspace.kernels.scalars import profile
+from opspace.kernels.compiled_scalars import profile
 from opspace.law.scalars import RANK_TOLERANCE
 from opspace.machine.jit import jit
 

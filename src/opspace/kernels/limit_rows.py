@@ -15,9 +15,9 @@ from opspace.kernels.columns import (
     LIMIT_LAW,
     LIMIT_PROFILE,
 )
+from opspace.kernels.compiled_scalars import limit_command, limit_presence, rises
 from opspace.kernels.inertia import acceleration_of, whiten
 from opspace.kernels.projection import nearest_acceleration
-from opspace.kernels.scalars import limit_command, limit_presence, rises
 from opspace.law.scalars import BROKEN, LOST
 from opspace.machine.jit import jit
 

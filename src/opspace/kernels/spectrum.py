@@ -8,7 +8,7 @@ import numpy as np
 
 from opspace.kernels.algebra import singular_values
 from opspace.kernels.columns import SIGMA_LOWER, SIGMA_PROFILE, SIGMA_UPPER, SINGULAR
-from opspace.kernels.scalars import profile
+from opspace.kernels.compiled_scalars import profile
 from opspace.machine.jit import jit
 
 

@@ -24,8 +24,8 @@ from opspace.kernels.columns import (
     TOOL_AXES,
     TURN,
 )
+from opspace.kernels.compiled_scalars import goes_on, speed_scale
 from opspace.kernels.motion import A, P, R, V, measure, move_joints
-from opspace.kernels.scalars import goes_on, speed_scale
 from opspace.machine.jit import jit
 
 

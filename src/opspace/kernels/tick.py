@@ -27,6 +27,7 @@ from opspace.kernels.columns import (
     TASK_BIAS,
     WORLD,
 )
+from opspace.kernels.compiled_scalars import ramp
 from opspace.kernels.corners import corners, insert, sort_corners
 from opspace.kernels.dynamics import evaluate
 from opspace.kernels.inertia import (
@@ -40,7 +41,6 @@ from opspace.kernels.inertia import (
 )
 from opspace.kernels.level import project, solve_level, take_alternative
 from opspace.kernels.limit_rows import SIGN, begin_limits, insert_limits, keep_bounds
-from opspace.kernels.scalars import ramp
 from opspace.kernels.task_rows import evaluate_tasks
 from opspace.kernels.walk import begin, keep_inside, pass_on, slot_bit, walk
 from opspace.law.scalars import LIMIT_PASSES

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from opspace.kernels.compiled_scalars import room_for
 from opspace.kernels.inertia import torque_of
 from opspace.kernels.level import project, solve_level, take_alternative
-from opspace.kernels.scalars import room_for
 from opspace.machine.jit import jit
 
 # Columns of ``Space.cursor``: corners of a node, the next one, corners of its group, next alternative.
