@@ -1,7 +1,7 @@
 """Scalar laws and numbers that the readable and the compiled form share; each stands here once.
 
-Plain functions of floats: the readable form calls them as they are, and `opspace.kernels.compiled_scalars`
-compiles all of them. They may call one another and use numbers of this module, nothing else.
+Plain functions of floats: the readable form calls them as they are, the kernels compile all of them.
+They may call one another and use numbers of this module, nothing else.
 """
 
 # pyright: strict
