@@ -111,11 +111,11 @@ class Controller(ReferenceController):
         members = begin_tick(t)
         laid_out = self._laid_out
         if laid_out is None or members is not laid_out[0]:
-            if not Plan.fits(members):
+            laid_out = self._lay_out(members)
+            if laid_out is None:
                 robot.update(robot.q, robot.v)
                 self._leave(members)
                 return self._answer(t, members, STATUSES[timing])
-            laid_out = self._lay_out(members)
         _, plan, handle, torque, memory = laid_out
         if plan.moving or CHANGES.last is not plan.seen:
             plan.refresh(robot, t)
@@ -268,13 +268,15 @@ class Controller(ReferenceController):
                 ready[key] = known.get(key) or self._planned(members, axes)
         self._ready = ready
 
-    def _lay_out(self, members: tuple[Member, ...]) -> _LaidOut:
+    def _lay_out(self, members: tuple[Member, ...]) -> _LaidOut | None:
+        """Take up the plan for these tasks, or None where there are too many of them."""
         assert self._axes is not None
         before, key = self._plan, structure(members)
-        if before is not None and before.structure == key:
-            plan = before
-        else:
-            plan = self._ready.get(key) or self._planned(members, self._axes)
+        plan = before if before is not None and before.structure == key else self._ready.get(key)
+        if plan is None:
+            if not Plan.fits(members):
+                return None
+            plan = self._planned(members, self._axes)
         plan.go_on_from(before, members)
         if self._readable:
             plan.come_back(self._blending)

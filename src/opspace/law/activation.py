@@ -88,8 +88,7 @@ class Buffer:
         return Activation(h.value, h.slope / width, h.curvature / width**2)
 
 
-@dataclass(frozen=True)
-class Ramp:
+class Ramp(NamedTuple):
     """Activation by time, which can be sent elsewhere at any moment without a step.
 
     h(t) = profile(s(t)). An undisturbed ramp has s(t) = (t − start_time) / duration. When a running
@@ -100,10 +99,10 @@ class Ramp:
     Build the first one with `Ramp.resting` and every other one with `towards`.
     """
 
+    profile: str
     target: float
     start_time: float
     duration: float
-    profile: str
     phase: float
     rate: float
     acceleration: float
@@ -124,7 +123,7 @@ class Ramp:
         """
         _check_target(value)
         Profile(profile)
-        return Ramp(value, 0.0, 0.0, profile, value, 0.0, 0.0, 0.0, 0.0)
+        return Ramp(profile, value, 0.0, 0.0, value, 0.0, 0.0, 0.0, 0.0)
 
     def towards(self, target: float, duration: float, t: float) -> "Ramp":
         """Build the ramp that leaves the present activation at ``t`` and arrives ``duration`` later.
@@ -146,13 +145,13 @@ class Ramp:
         if not math.isfinite(t):
             raise InputError(f"the time of a ramp must be finite, got {t}")
         if duration < _INSTANT:
-            return Ramp(target, t, 0.0, self.profile, target, 0.0, 0.0, 0.0, 0.0)
+            return Ramp(self.profile, target, t, 0.0, target, 0.0, 0.0, 0.0, 0.0)
         s, rate, acceleration = self._phase(t)
         if not 0.0 < s < 1.0:
             # h is flat here, so the phase may start at the edge with whatever rate it needs.
             edge = min(max(s, 0.0), 1.0)
             cruise = (target - edge) / duration
-            return Ramp(target, t, duration, self.profile, edge, cruise, 0.0, 0.0, cruise)
+            return Ramp(self.profile, target, t, duration, edge, cruise, 0.0, 0.0, cruise)
         # Long enough to be gentle, short enough that s overshoots by at most about 1/8.
         blend = 0.5 * duration
         if rate != 0.0:
@@ -161,7 +160,7 @@ class Ramp:
             blend = min(blend, 1.0 / math.sqrt(abs(acceleration)))
         covered = blend * rate / 2.0 + blend**2 * acceleration / 12.0
         cruise = (target - s - covered) / (duration - 0.5 * blend)
-        return Ramp(target, t, duration, self.profile, s, rate, acceleration, blend, cruise)
+        return Ramp(self.profile, target, t, duration, s, rate, acceleration, blend, cruise)
 
     def __call__(self, t: float) -> Activation:
         """Evaluate h, dh/dt [1/s] and d²h/dt² [1/s²] at time ``t`` [s]."""
@@ -174,15 +173,12 @@ class Ramp:
         return t >= self.start_time + self.duration
 
     def _phase(self, t: float) -> tuple[float, float, float]:
-        return ramp_phase(t, *self.numbers)
+        return ramp_phase(t, *self[1:])
 
     @property
-    def numbers(self) -> tuple[float, float, float, float, float, float, float, float]:
+    def numbers(self) -> tuple[float, ...]:
         """Target, start, duration, phase, rate, acceleration, blend time and cruise rate."""
-        return (
-            self.target, self.start_time, self.duration, self.phase,
-            self.rate, self.acceleration, self.blend_time, self.cruise,
-        )  # fmt: skip
+        return self[1:]
 
 
 def _check_target(value: float) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 from opspace.law import Ramp
 from opspace.tasks import Task
@@ -46,12 +47,12 @@ class Variable:
         if self.arrived(t):
             if ramp.target == target:
                 return
-            ramp = Ramp.resting(ramp.target, profile)
+            if ramp.duration != 0.0 or ramp.profile != profile:
+                ramp = Ramp.resting(ramp.target, profile)
         self.ramp = ramp.towards(target, duration, t)
 
 
-@dataclass(frozen=True)
-class Place:
+class Place(NamedTuple):
     """A level at which a task is, or to which it is on its way.
 
     Attributes:
