@@ -45,7 +45,7 @@ def test_no_joint_accelerates_more_than_it_may(motors, seed):
     PANDA.update(q, v)
     acceleration = np.linalg.solve(PANDA.M, command.tau - PANDA.bias)
     for term in limit_terms(limits, q, v):
-        towards = term.sign * acceleration[term.index]
+        towards = term.side.sign * acceleration[term.side.index]
         assert towards <= term.command + 2e-3 * max(1.0, abs(term.command))
 
 

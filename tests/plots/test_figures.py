@@ -84,7 +84,7 @@ def test_nothing_global_changes(singularity, joint_limit):
 
 @pytest.mark.parametrize(
     ("package", "module"),
-    [("matplotlib", "plots"), ("mujoco", "sim.snapshots"), ("PIL", "sim.snapshots")],
+    [("matplotlib", "plots"), ("mujoco", "pictures.snapshots"), ("PIL", "pictures.snapshots")],
 )
 def test_a_missing_package_is_named_with_its_extra(package, module):
     code = (
