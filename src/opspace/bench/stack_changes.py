@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import gc
-from collections.abc import Mapping
 from time import perf_counter_ns, sleep
-from types import MappingProxyType
 
 import numpy as np
 
@@ -19,16 +17,14 @@ from opspace.tasks import JointLimits, OrientationTask, PositionTask, PostureTas
 HEADS = ("change of the stack", "loop", "p50 [µs]", "p99 [µs]", "max [µs]", "around", "ratio")
 PERIOD = 2.0**-10
 """Time between two ticks, s: sums of it are exact, so that ramps end in the tick that is meant."""
-CHANGES: Mapping[str, int] = MappingProxyType(
-    {
-        "an insertion begins": 0,
-        "a move begins on the way": 6,
-        "the insertion ends": 12,
-        "the move ends": 18,
-        "a removal begins": 24,
-        "the removal ends": 36,
-    }
-)
+CHANGES = {
+    "an insertion begins": 0,
+    "a move begins on the way": 6,
+    "the insertion ends": 12,
+    "the move ends": 18,
+    "a removal begins": 24,
+    "the removal ends": 36,
+}
 """Ticks of a round in which something happens."""
 ROUND = 44
 AROUND = 3

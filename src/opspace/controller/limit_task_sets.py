@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -16,48 +17,37 @@ TOP = -1
 """Priority of joint limits: above every level of the stack."""
 
 
-@dataclass(frozen=True)
-class LimitTerms:
-    """One limit in one tick, with accelerations counted towards the limit.
+class LimitTerms(NamedTuple):
+    """One limit in one tick.
 
     Attributes:
         side: The limit.
-        position: Of the joint, rad.
-        speed: Of the joint, rad/s.
-        command: Acceleration that the task set asks for, rad/s².
+        command: Acceleration towards the limit that the task set asks for, rad/s².
     """
 
     side: Side
-    position: float
-    speed: float
     command: float
 
 
 def limit_terms(
-    limits: JointLimits,
-    positions: np.ndarray,
-    v: np.ndarray,
-    disturbance: np.ndarray | None = None,
+    limits: JointLimits, q: np.ndarray, v: np.ndarray, disturbance: np.ndarray | None = None
 ) -> list[LimitTerms]:
     """Evaluate every limit at the present state.
 
     Args:
         limits: The limits, bound to the robot.
-        positions: (n,) joint positions, rad.
+        q: (n,) joint positions, rad.
         v: (n,) joint velocities, rad/s.
         disturbance: (n,) accelerations that come on top of the commanded ones, rad/s²; None for none.
 
     Returns:
         One entry per limit.
     """
-    terms: list[LimitTerms] = []
-    for side in limits.sides:
-        position, speed = float(positions[side.index]), float(v[side.index])
-        command = limits.admissible(side, position, speed)
-        if disturbance is not None:
-            command -= side.sign * float(disturbance[side.index])
-        terms.append(LimitTerms(side, position, speed, command))
-    return terms
+    beside = np.zeros(v.size) if disturbance is None else disturbance
+    return [
+        LimitTerms(side, command - side.sign * float(beside[side.index]))
+        for side, command in zip(limits.sides, limits.commands(q, v), strict=True)
+    ]
 
 
 @dataclass(frozen=True)
@@ -76,6 +66,8 @@ class Insertion:
 def insertions(
     limits: JointLimits,
     terms: Sequence[LimitTerms],
+    q: np.ndarray,
+    v: np.ndarray,
     acceleration: np.ndarray,
     known: Mapping[int, Insertion],
 ) -> dict[int, Insertion]:
@@ -90,6 +82,8 @@ def insertions(
     Args:
         limits: Their law.
         terms: Every limit.
+        q: (n,) joint positions, rad.
+        v: (n,) joint velocities, rad/s.
         acceleration: (n,) joint accelerations under the stack with the insertions known so far.
         known: Insertions so far, by index of the limit.
 
@@ -97,15 +91,13 @@ def insertions(
         The insertions with an activation above 0, by index of the limit.
     """
     found: dict[int, Insertion] = {}
-    for i, term in enumerate(terms):
-        side = term.side
+    commands = [term.command for term in terms]
+    for i, (h, wish) in enumerate(limits.presences(q, v, acceleration, commands)):
         before = known.get(i, Insertion(0.0, -np.inf))
-        other = float(side.sign * acceleration[side.index])
-        h, desired = limits.presence(side, term.position, term.speed, other, term.command)
-        h, desired = max(h, before.activation), max(desired, before.desired)
-        if h > 0.0:
-            new = rises(h, before.activation) or rises(desired, before.desired)
-            found[i] = Insertion(h, desired) if new else before
+        now = Insertion(max(h, before.activation), max(wish, before.desired))
+        if now.activation > 0.0:
+            more = rises(now.activation, before.activation) or rises(now.desired, before.desired)
+            found[i] = now if more else before
     return found
 
 

@@ -240,7 +240,7 @@ def whiten_tasks(
 def law(
     k: Given, L: np.ndarray, mixed: Mixture, tasks: Blend, limits: Blend
 ) -> tuple[np.ndarray, LawInfo]:
-    """Γ_tasks of the stacks, under the joint limits that take part (Eq. 19-23)."""
+    """Γ_tasks of the stacks, under the joint limits that take part (Eq. 20, Eq. 23)."""
     rules = k.rules
     sets = [*limits.task_sets, *tasks.task_sets]
     if rules.bias == "task":
@@ -278,7 +278,7 @@ def insert_limits(
 ) -> Mapping[int, Insertion]:
     """Limits that the accelerations of the stack call for."""
     assert k.rules.limits is not None
-    return insertions(k.rules.limits, bounds, acceleration, known)
+    return insertions(k.rules.limits, bounds, k.q, k.v, acceleration, known)
 
 
 def limit_corners(

@@ -224,7 +224,7 @@ def damp_rest(work, n):
 
 @jit
 def law(work, stacks, limit_stacks):
-    """û = Σ_T w_T H(T; f̃) of the stacks, under the joint limits that take part (Eq. 19-23).
+    """û = Σ_T w_T H(T; f̃) of the stacks, under the joint limits that take part (Eq. 20, Eq. 23).
 
     Reads Jw, fw, the corners and rest; writes u (n,), √J/s, and what `SPACE` keeps for the report.
     """

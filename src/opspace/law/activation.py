@@ -11,8 +11,7 @@ from opspace.errors import InputError, unknown_name
 from opspace.law.scalars import (
     PROFILES,
     profile,
-    profile_curvature,
-    profile_slope,
+    profile_derivatives,
     ramp_phase,
 )
 
@@ -50,7 +49,7 @@ class Profile:
     def __call__(self, s: float) -> Activation:
         """Evaluate h, dh/ds and d²h/ds² at ``s`` (any real number)."""
         code = PROFILES.index(self.name)
-        return Activation(profile(code, s), profile_slope(code, s), profile_curvature(code, s))
+        return Activation(profile(code, s), *profile_derivatives(code, s))
 
 
 @dataclass(frozen=True)
@@ -146,7 +145,7 @@ class Ramp(NamedTuple):
             raise InputError(f"the time of a ramp must be finite, got {t}")
         if duration < _INSTANT:
             return Ramp(self.profile, target, t, 0.0, target, 0.0, 0.0, 0.0, 0.0)
-        s, rate, acceleration = self._phase(t)
+        s, rate, acceleration = ramp_phase(t, *self.numbers)
         if not 0.0 < s < 1.0:
             # h is flat here, so the phase may start at the edge with whatever rate it needs.
             edge = min(max(s, 0.0), 1.0)
@@ -164,16 +163,13 @@ class Ramp(NamedTuple):
 
     def __call__(self, t: float) -> Activation:
         """Evaluate h, dh/dt [1/s] and d²h/dt² [1/s²] at time ``t`` [s]."""
-        s, rate, acceleration = self._phase(t)
+        s, rate, acceleration = ramp_phase(t, *self.numbers)
         h = Profile(self.profile)(s)
         return Activation(h.value, h.slope * rate, h.curvature * rate**2 + h.slope * acceleration)
 
     def finished(self, t: float) -> bool:
         """Tell whether the ramp has arrived at its target at time ``t`` [s]."""
         return t >= self.start_time + self.duration
-
-    def _phase(self, t: float) -> tuple[float, float, float]:
-        return ramp_phase(t, *self[1:])
 
     @property
     def numbers(self) -> tuple[float, ...]:

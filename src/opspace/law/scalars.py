@@ -59,34 +59,20 @@ def profile(code: int, s: float) -> float:
     return min(max(h, 0.0), 1.0)
 
 
-def profile_slope(code: int, s: float) -> float:
-    """Evaluate dh/ds."""
+def profile_derivatives(code: int, s: float) -> tuple[float, float]:
+    """Evaluate dh/ds and d²h/ds²."""
     if s <= 0.0 or s >= 1.0 or code == STEP:
-        return 0.0
+        return 0.0, 0.0
     if code == QUINTIC:
-        return 30.0 * s * s * (1.0 - s) ** 2
+        return 30.0 * s * s * (1.0 - s) ** 2, 60.0 * s * (1.0 - s) * (1.0 - 2.0 * s)
     if code == CUBIC:
-        return 6.0 * s * (1.0 - s)
+        return 6.0 * s * (1.0 - s), 6.0 - 12.0 * s
     if code == HALF_SINE:
-        return 0.5 * math.pi * math.sin(math.pi * s)
+        angle = math.pi * s
+        return 0.5 * math.pi * math.sin(angle), 0.5 * math.pi**2 * math.cos(angle)
     if code == TANH:
-        return _tanh_derivatives(s)[0]
-    return 1.0
-
-
-def profile_curvature(code: int, s: float) -> float:
-    """Evaluate d²h/ds²."""
-    if s <= 0.0 or s >= 1.0 or code == STEP:
-        return 0.0
-    if code == QUINTIC:
-        return 60.0 * s * (1.0 - s) * (1.0 - 2.0 * s)
-    if code == CUBIC:
-        return 6.0 - 12.0 * s
-    if code == HALF_SINE:
-        return 0.5 * math.pi**2 * math.cos(math.pi * s)
-    if code == TANH:
-        return _tanh_derivatives(s)[1]
-    return 0.0
+        return _tanh_derivatives(s)
+    return 1.0, 0.0
 
 
 def _tanh(s: float) -> float:
@@ -109,16 +95,9 @@ def _tanh_derivatives(s: float) -> tuple[float, float]:
 
 
 def ramp_phase(
-    t: float,
-    target: float,
-    start_time: float,
-    duration: float,
-    phase: float,
-    rate: float,
-    acceleration: float,
-    width: float,
-    cruise: float,
-) -> tuple[float, float, float]:
+    t: float, target: float, start_time: float, duration: float, phase: float,
+    rate: float, acceleration: float, width: float, cruise: float,
+) -> tuple[float, float, float]:  # fmt: skip
     """Evaluate s(t) of a ramp and its first two derivatives.
 
     The rate of s is led by a cubic Hermite segment of this width from (rate, acceleration) to
@@ -146,17 +125,9 @@ def ramp_phase(
 
 
 def ramp(
-    t: float,
-    code: int,
-    target: float,
-    start_time: float,
-    duration: float,
-    phase: float,
-    rate: float,
-    acceleration: float,
-    width: float,
-    cruise: float,
-) -> float:
+    t: float, code: int, target: float, start_time: float, duration: float, phase: float,
+    rate: float, acceleration: float, width: float, cruise: float,
+) -> float:  # fmt: skip
     """Evaluate h(t) of a ramp with the profile of this code."""
     s, _, _ = ramp_phase(t, target, start_time, duration, phase, rate, acceleration, width, cruise)
     return profile(code, s)
@@ -208,58 +179,34 @@ def allowed_speed(d: float, brake: float, k1: float) -> tuple[float, float]:
 
 
 def admissible_command(
-    d: float,
-    towards: float,
-    brake: float,
-    most: float,
-    k1: float,
-    k2: float,
-    kp: float,
-    buffer: float,
-) -> float:
+    d: float, towards: float, brake: float, most: float,
+    k1: float, k2: float, kp: float, buffer: float,
+) -> float:  # fmt: skip
     """Evaluate q̈_adm at distance d and speed ``towards``, for the largest speed ``most``."""
     allowed, slope = allowed_speed(d, brake, k1)
     return min(-towards * slope + k2 * (allowed - towards), k2 * (most - towards))
 
 
 def admissible_presence(
-    d: float,
-    towards: float,
-    brake: float,
-    buffer: float,
-    other: float,
-    command: float,
-    margin: float,
-    code: int,
-) -> tuple[float, float]:
+    d: float, towards: float, brake: float, buffer: float,
+    other: float, command: float, margin: float, code: int,
+) -> tuple[float, float]:  # fmt: skip
     """Rise with ``other``, and ask for the smaller of both: what happens anyway pushes nobody."""
     return profile(code, (other - (command - margin)) / margin), min(other, command)
 
 
 def buffer_command(
-    d: float,
-    towards: float,
-    brake: float,
-    most: float,
-    k1: float,
-    k2: float,
-    kp: float,
-    buffer: float,
-) -> float:
+    d: float, towards: float, brake: float, most: float,
+    k1: float, k2: float, kp: float, buffer: float,
+) -> float:  # fmt: skip
     """Evaluate f* of Eq. 24 with the inner edge of a position buffer as target."""
     return kp * (d - buffer) - 2.0 * math.sqrt(kp) * towards
 
 
 def buffer_presence(
-    d: float,
-    towards: float,
-    brake: float,
-    buffer: float,
-    other: float,
-    command: float,
-    margin: float,
-    code: int,
-) -> tuple[float, float]:
+    d: float, towards: float, brake: float, buffer: float,
+    other: float, command: float, margin: float, code: int,
+) -> tuple[float, float]:  # fmt: skip
     """Rise with the position (Fig. 7) from the inner edge, which retreats by v²/2a, to the limit."""
     ahead = max(towards, 0.0)
     inner = buffer + ahead * ahead / (2.0 * brake)

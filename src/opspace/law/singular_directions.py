@@ -18,6 +18,7 @@ from jaxtyping import Float
 from opspace.errors import InputError
 from opspace.law.activation import Buffer
 from opspace.law.hierarchy import Partial
+from opspace.law.scalars import PROFILES, profile
 
 
 @dataclass(frozen=True)
@@ -54,7 +55,8 @@ class SigmaBuffer:
         """Activation h(σ) of a direction, 0 below the buffer and 1 above."""
         if not self.lower < sigma < self.upper:
             return float(sigma >= self.upper)
-        return Buffer(self.lower, self.upper, self.profile)(sigma).value
+        s = (sigma - self.lower) / (self.upper - self.lower)
+        return profile(PROFILES.index(self.profile), s)
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from opspace.law import Ramp
+from opspace.law import PROFILES, Ramp
+from opspace.law.scalars import ramp
 from opspace.tasks import Task
 
 
@@ -31,7 +32,8 @@ class Variable:
 
     def value(self, t: float) -> float:
         """Evaluate it at time ``t`` [s]."""
-        return self.ramp(t).value
+        name, *numbers = self.ramp
+        return ramp(t, PROFILES.index(name), *numbers)
 
     def idle(self, t: float) -> bool:
         """Tell whether it has had no effect up to time ``t`` [s] and may be forgotten."""

@@ -222,6 +222,21 @@ class JointLimits(KnownAttributes):
             d, towards, side.brake, self.buffer, other, command, self.margin(side), code
         )
 
+    def commands(self, q: Array, v: Array) -> list[float]:
+        """Evaluate `admissible` of every side at positions (n,) and velocities (n,)."""
+        positions, speeds = q.tolist(), v.tolist()
+        return [self.admissible(s, positions[s.index], speeds[s.index]) for s in self.sides]
+
+    def presences(
+        self, q: Array, v: Array, acceleration: Array, commands: Sequence[float]
+    ) -> list[tuple[float, float]]:
+        """Evaluate `presence` of every side for these joint accelerations, (n,) rad/s²."""
+        positions, speeds, other = q.tolist(), v.tolist(), acceleration.tolist()
+        return [
+            self.presence(s, positions[s.index], speeds[s.index], s.sign * other[s.index], command)
+            for s, command in zip(self.sides, commands, strict=True)
+        ]
+
     def allowed_speed(self, side: Side, distance: float) -> float:
         """Speed towards a limit from which the joint still stops at it, v_adm(d), rad/s or m/s."""
         return allowed_speed(distance, side.brake, self.k1)[0]
