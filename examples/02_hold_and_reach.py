@@ -8,7 +8,7 @@ robot = osc.load_robot("puma560")
 position = osc.PositionTask(kp=100.0)
 stack = osc.Stack([osc.OrientationTask(), position, osc.PostureTask()])
 controller = osc.Controller(robot, stack)
-plant = osc.MujocoPlant(robot, robot.q_reference)
+plant = osc.Plant(robot, robot.q_reference)
 
 here = robot.position(robot.frame_id(robot.tool)).copy()
 position.target = osc.MinimumJerk(here, here + [0.0, 0.2, 0.1], 1.0)

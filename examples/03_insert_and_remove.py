@@ -7,7 +7,7 @@ import opspace as osc
 robot = osc.load_robot("puma560")
 stack = osc.Stack([osc.PositionTask(), osc.PostureTask()])
 controller = osc.Controller(robot, stack)
-plant = osc.MujocoPlant(robot, robot.q_reference)
+plant = osc.Plant(robot, robot.q_reference)
 elbow = osc.JointTask("joint3", float(robot.q_reference[2]) + 0.3)
 
 stack.insert(elbow, level=-1, duration=0.5, start_time=0.2)

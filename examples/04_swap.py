@@ -8,7 +8,7 @@ position = osc.PositionTask(target=tool + [0.1, 0.0, 0.0])
 posture = osc.PostureTask(robot.q_reference)
 stack = osc.Stack([position, posture])
 controller = osc.Controller(robot, stack)
-plant = osc.MujocoPlant(robot, robot.q_reference)
+plant = osc.Plant(robot, robot.q_reference)
 
 osc.simulate(plant, controller, 1.0)
 for text, until in (("swap", 0.25), ("turn round", 0.25), ("swap for good", 1.0)):

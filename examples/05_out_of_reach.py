@@ -12,7 +12,7 @@ back = osc.MinimumJerk(out, here, 2.0, start_time=2.5)
 position = osc.PositionTask(target=lambda t: there(t) if t < 2.5 else back(t))
 stack = osc.Stack([osc.OrientationTask(), position, osc.PostureTask(kp=25.0)])
 controller = osc.Controller(robot, stack)
-plant = osc.MujocoPlant(robot, robot.q_reference)
+plant = osc.Plant(robot, robot.q_reference)
 
 
 class Watch:

@@ -8,7 +8,7 @@ start = float(robot.q_reference[0])
 limits = osc.JointLimits(joints={joint: (start - 1.0, start + 0.5)})
 swing = osc.JointTask(joint, start)
 controller = osc.Controller(robot, osc.Stack([limits, swing, osc.PostureTask()]))
-plant = osc.MujocoPlant(robot, robot.q_reference)
+plant = osc.Plant(robot, robot.q_reference)
 
 motions = [
     osc.MinimumJerk([start], [start + 0.9], 1.0),

@@ -11,7 +11,7 @@ controller = osc.Controller(robot, stack)
 controller.warm_up()
 elbow = osc.JointTask("joint3", float(robot.q_reference[2]) + 0.2)
 stack.prepare(elbow)  # what takes long, before the loop
-plant = osc.MujocoPlant(robot, robot.q_reference)
+plant = osc.Plant(robot, robot.q_reference)
 asked = []
 
 

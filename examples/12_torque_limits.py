@@ -26,7 +26,7 @@ def swing(torque_limits):
     target = osc.MinimumJerk(here, here + [-0.3, 0.5, 0.3], 0.35)
     stack = osc.Stack([osc.OrientationTask(), osc.PositionTask(target=target), osc.PostureTask()])
     controller = osc.Controller(robot, stack, torque_limits=torque_limits)
-    plant = osc.MujocoPlant(robot, robot.q_reference)  # its motors clip at their limits
+    plant = osc.Plant(robot, robot.q_reference)  # its motors clip at their limits
     watch = Watch(robot)
     osc.simulate(plant, controller, 2.0, [watch])
     return watch

@@ -62,9 +62,9 @@ def test_a_command_tells_time_status_and_torque(kind):
 
 
 def test_a_plant_tells_its_robot_and_time():
-    plant = osc.MujocoPlant(ROBOT, Q, dt=0.002)
+    plant = osc.Plant(ROBOT, Q, dt=0.002)
     plant.advance(np.zeros(6))
-    assert repr(plant).startswith("MujocoPlant('puma560', t=0.002 s, dt=0.002 s, fastest joint ")
+    assert repr(plant).startswith("Plant('puma560', t=0.002 s, dt=0.002 s, fastest joint ")
 
 
 def test_nothing_says_more_than_a_few_lines():

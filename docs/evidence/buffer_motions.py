@@ -219,7 +219,7 @@ def run(
         The run.
     """
     controller = osc.Controller(robot, osc.Stack(levels), singularity=singularity)
-    plant = osc.MujocoPlant(robot, robot.q_reference if q is None else q)
+    plant = osc.Plant(robot, robot.q_reference if q is None else q)
     known = robot.torque_limit[np.isfinite(robot.torque_limit)]
     stop = osc.StopRule(MAX_SPEED, STRENGTH * float(known.max()))
     watch = Watch()

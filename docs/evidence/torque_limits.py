@@ -16,7 +16,7 @@ from opspace.plan.calibration import sample_postures
 from opspace.plots.labels import number
 from opspace.scenario.build import build, build_robot
 from opspace.scenario.load import load_scenario
-from opspace.sim import MujocoPlant
+from opspace.sim import Plant
 
 SCENARIO = "showpiece-panda"
 PAGE = Path(__file__).resolve().parents[1] / "safety.md"
@@ -54,7 +54,7 @@ def run(limit, mode):
     if limit is not None:
         # After the controller was built: what joints can brake with stays what it is.
         robot.torque_limit = limit
-        plant = MujocoPlant(robot, plant.q, dt=built.scenario.dt)
+        plant = Plant(robot, plant.q, dt=built.scenario.dt)
     watch = Watch(robot)
     stop = StopRule(max_joint_speed=GIVE_UP_SPEED)
     outcome = simulate(plant, built.controller, built.scenario.duration, [watch], stop)

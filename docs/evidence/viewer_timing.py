@@ -84,7 +84,7 @@ def objects():
     tasks = [osc.OrientationTask(), osc.PositionTask(max_speed=0.5), osc.PostureTask()]
     controller = osc.Controller(robot, osc.Stack(tasks))
     controller.warm_up()
-    return controller, osc.MujocoPlant(robot, robot.q_reference), Clock(controller)
+    return controller, osc.Plant(robot, robot.q_reference), Clock(controller)
 
 
 def elbow():

@@ -29,9 +29,9 @@ if TYPE_CHECKING:
     from opspace.law import TaskSet as TaskSet
     from opspace.law import intermediate_values as intermediate_values
     from opspace.law import task_torque as task_torque
+    from opspace.loop import AnyPlant as AnyPlant
     from opspace.loop import Observer as Observer
     from opspace.loop import Outcome as Outcome
-    from opspace.loop import Plant as Plant
     from opspace.loop import Stepping as Stepping
     from opspace.loop import StopRule as StopRule
     from opspace.loop import simulate as simulate
@@ -49,7 +49,7 @@ if TYPE_CHECKING:
     from opspace.robots import RobotInfo as RobotInfo
     from opspace.robots import available_robots as available_robots
     from opspace.robots import load_robot as load_robot
-    from opspace.sim import MujocoPlant as MujocoPlant
+    from opspace.sim import Plant as Plant
     from opspace.stack import Stack as Stack
     from opspace.tasks import ActivationProduct as ActivationProduct
     from opspace.tasks import Chain as Chain
@@ -96,10 +96,10 @@ _NAMES = {
     "opspace.record.observer": "TickRecorder",
     "opspace.record.replay": "Replay replay",
     "opspace.robots": "Robot RobotInfo available_robots load_robot",
-    "opspace.loop": "Observer Outcome Plant Stepping StopRule simulate",
+    "opspace.loop": "AnyPlant Observer Outcome Stepping StopRule simulate",
     "opspace.plan.calibration": "Calibration",
     "opspace.plan.scales": "Singularity",
-    "opspace.sim": "MujocoPlant",
+    "opspace.sim": "Plant",
     "opspace.stack": "Stack",
     "opspace.tasks": (
         "ActivationProduct Chain Circle ComTask Constant DistanceBuffer JerkLimited JointBuffer "

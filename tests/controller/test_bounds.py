@@ -10,7 +10,7 @@ from opspace import Status
 from opspace.controller import ReferenceController
 from opspace.controller.limit_task_sets import limit_terms
 from opspace.loop import simulate
-from opspace.sim import MujocoPlant
+from opspace.sim import Plant
 
 PANDA = osc.load_robot("panda")
 
@@ -86,7 +86,7 @@ def test_a_joint_does_not_become_faster_than_it_may():
             def observe(self, q, v, command):
                 seen.append((np.max(np.abs(v)), np.max(np.abs(np.asarray(command.tau)))))  # noqa: B023
 
-        simulate(MujocoPlant(PANDA, PANDA.q_reference), controller, 1.5, [Watch()])
+        simulate(Plant(PANDA, PANDA.q_reference), controller, 1.5, [Watch()])
         fastest[name] = max(speed for speed, _ in seen)
     fast = float(PANDA.velocity_limit.max())
     assert fastest["none"] > 2.0 * fast

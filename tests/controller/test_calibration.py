@@ -6,7 +6,7 @@ import pytest
 from opspace.controller import Controller
 from opspace.loop import simulate
 from opspace.robots import load_robot
-from opspace.sim import MujocoPlant
+from opspace.sim import Plant
 from opspace.stack import Stack
 from opspace.tasks import MinimumJerk, PositionTask, PostureTask
 
@@ -40,7 +40,7 @@ def led_out(robot, **options):
     hand = PositionTask("tip", kp=100.0, name="hand", **options)
     controller = Controller(robot, Stack([hand, PostureTask(kp=25.0)]))
     start = np.array([0.2, 1.2, 0.3])
-    plant = MujocoPlant(robot, start)
+    plant = Plant(robot, start)
     robot.update(start, np.zeros(3))
     here = robot.position(robot.frame_id("tip")).copy()
     hand.target = MinimumJerk(here, 2.0 * here, duration=2.0)

@@ -7,7 +7,7 @@ import opspace as osc
 from opspace.controller import ReferenceController
 from opspace.controller.disturbance import DisturbanceObserver
 from opspace.loop import simulate
-from opspace.sim import Disturbances, MujocoPlant
+from opspace.sim import Disturbances, Plant
 
 PANDA = osc.load_robot("panda")
 
@@ -50,7 +50,7 @@ def driven_into_limits(observer_time, clearance=0.01, kind=osc.Controller, durat
     posture = osc.PostureTask(PANDA.q_upper + 0.5, kp=200.0, max_speed=4.0)
     controller = kind(PANDA, osc.Stack([posture], limits=limits), torque_limits="priority")
     reach = Reach()
-    plant = MujocoPlant(PANDA, PANDA.q_reference, disturbances=Disturbances(**wrong))
+    plant = Plant(PANDA, PANDA.q_reference, disturbances=Disturbances(**wrong))
     assert simulate(plant, controller, duration, [reach]).completed
     return reach.beyond, plant.q
 

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 import opspace as osc
 from opspace import Status
 from opspace.law.scalars import LOST
-from opspace.sim import MujocoPlant
+from opspace.sim import Plant
 
 ARMS = tuple(r.name for r in osc.available_robots() if r.kind == "arm" and r.installed)
 MOTORS = ("report", "priority")
@@ -33,7 +33,7 @@ class Adversary:
         self.posture = osc.PostureTask(robot.q_reference, kp=1e5)
         self.stack = osc.Stack([self.tool, self.turn, self.posture], limits=self.limits)
         self.controller = osc.Controller(robot, self.stack, torque_limits=motors)
-        self.plant = MujocoPlant(robot, robot.q_reference, torque_limits=motors == "priority")
+        self.plant = Plant(robot, robot.q_reference, torque_limits=motors == "priority")
         self.t = 0.0
         self.side = np.ones(robot.nv)
 

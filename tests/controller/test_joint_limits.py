@@ -11,7 +11,7 @@ from opspace.errors import InputError, UnknownNameError
 from opspace.law.scalars import allowed_speed
 from opspace.loop import simulate
 from opspace.robots import load_robot
-from opspace.sim import MujocoPlant
+from opspace.sim import Plant
 from opspace.stack import Stack
 from opspace.tasks import JointLimits, MinimumJerk, OrientationTask, PositionTask, PostureTask
 from opspace.tasks.joint_limits import Side
@@ -182,7 +182,7 @@ def test_stiff_tasks_do_not_wake_limits_that_are_far_away(robot):
     position = PositionTask(target=target, kp=2500.0)
     posture = PostureTask(robot.q_reference)
     controller = Controller(robot, Stack([JointLimits(), OrientationTask(), position, posture]))
-    plant = MujocoPlant(robot, robot.q_reference, torque_limits=False)
+    plant = Plant(robot, robot.q_reference, torque_limits=False)
     torques, awake = [], []
 
     class Watch:
@@ -200,7 +200,7 @@ def test_a_joint_that_starts_outside_comes_back_and_stays(robot):
     q = robot.q_reference.copy()
     limits = JointLimits(joints={"joint1": (q[0] - 1.0, q[0] - 0.3), "joint3": (q[2] + 0.2, 0.0)})
     controller = Controller(robot, Stack([limits, PostureTask(q)]))
-    plant = MujocoPlant(robot, q, torque_limits=False)
+    plant = Plant(robot, q, torque_limits=False)
     path = []
 
     class Watch:

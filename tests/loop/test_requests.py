@@ -12,7 +12,7 @@ from opspace.errors import InputError, OpspaceError, RecordingError, UnknownName
 from opspace.loop import simulate
 from opspace.loop.requests import KINDS, Changes, RequestDesk, RequestPlayer, RunRequest
 from opspace.robots import load_robot
-from opspace.sim import MujocoPlant
+from opspace.sim import Plant
 from opspace.stack import Stack
 from opspace.tasks import JointTask, OrientationTask, PoseTask, PositionTask, PostureTask
 
@@ -39,7 +39,7 @@ class Run:
         self.elbow = JointTask("joint3", kp=50.0, name="elbow")
         tasks = [OrientationTask(), self.position, PostureTask(kp=20.0)]
         self.controller = Controller(self.robot, Stack(tasks))
-        self.plant = MujocoPlant(self.robot, self.robot.q_reference)
+        self.plant = Plant(self.robot, self.robot.q_reference)
         self.changes = Changes(self.controller, [self.elbow])
         self.rows = []
 
@@ -203,7 +203,7 @@ def test_a_dragged_target_and_a_gain_make_no_step():
     steps = []
     for dt in (0.001, 0.0005):
         run = Run()
-        run.plant = MujocoPlant(run.robot, run.robot.q_reference, dt=dt)
+        run.plant = Plant(run.robot, run.robot.q_reference, dt=dt)
         desk = RequestDesk(run.changes)
         asked = {}
         for k in range(6):
@@ -223,7 +223,7 @@ def test_a_led_task_arrives(kind):
     task = kind(kp=400.0)
     controller = Controller(robot, Stack([task, PostureTask(kp=20.0)]))
     changes = Changes(controller)
-    plant = MujocoPlant(robot, robot.q_reference)
+    plant = Plant(robot, robot.q_reference)
     simulate(plant, controller, 0.002)
     place = robot.frame_id(robot.tool)
     goal = {"position": tuple(robot.position(place) + [0.05, -0.04, 0.03])}
@@ -276,7 +276,7 @@ def test_a_gain_that_a_task_cannot_have_is_refused_before_it_is_on_its_way():
     answers = []
     desk = RequestDesk(Changes(controller), None, lambda request, reason: answers.append(reason))
     desk.ask(RunRequest("gain", ("position",), kp=10.0))
-    simulate(MujocoPlant(robot, robot.q_reference), controller, 0.01, [desk])
+    simulate(Plant(robot, robot.q_reference), controller, 0.01, [desk])
     assert "max_speed" in answers[0]
     assert task.kp == 0.0
 
@@ -293,7 +293,7 @@ def test_the_goal_of_a_pose_that_is_not_given_is_kept():
     robot = load_robot("puma560")
     task = PoseTask(kp=400.0)
     controller = Controller(robot, Stack([task, PostureTask(kp=20.0)]))
-    changes, plant = Changes(controller), MujocoPlant(robot, robot.q_reference)
+    changes, plant = Changes(controller), Plant(robot, robot.q_reference)
     simulate(plant, controller, 0.002)
     place = robot.position(robot.frame_id(robot.tool)) + [0.03, 0.0, -0.02]
     changes.apply(RunRequest("lead", ("pose",), orientation=(0.99, 0.1, 0.0, 0.0995)), plant.t)

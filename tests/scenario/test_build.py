@@ -48,7 +48,7 @@ def entry_defaults(entry):
     [
         (schema.SingularityEntry, opspace.Singularity),
         (schema.JointLimitsEntry, opspace.tasks.JointLimits),
-        (schema.PlantEntry, (opspace.sim.MujocoPlant, opspace.sim.Disturbances)),
+        (schema.PlantEntry, (opspace.sim.Plant, opspace.sim.Disturbances)),
         (schema.StopEntry, opspace.loop.StopRule),
         *((ENTRIES[name], kind.task) for name, kind in TASK_KINDS.items()),
     ],

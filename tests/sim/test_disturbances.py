@@ -9,14 +9,14 @@ from opspace.runs.replay_run import replay
 from opspace.runs.run import run_scenario
 from opspace.scenario import load_scenario
 from opspace.scenario.load import scenario_from, to_dict
-from opspace.sim import Disturbances, MujocoPlant, Push
+from opspace.sim import Disturbances, Plant, Push
 
 PANDA = osc.load_robot("panda")
 Q = PANDA.q_reference
 
 
 def plant(**given):
-    return MujocoPlant(PANDA, Q, disturbances=Disturbances(**given))
+    return Plant(PANDA, Q, disturbances=Disturbances(**given))
 
 
 def short(**options):

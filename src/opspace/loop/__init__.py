@@ -1,8 +1,8 @@
 """The one loop around a plant and a controller, its pace, and what is asked of it meanwhile."""
 
+from opspace.loop.any_plant import AnyPlant as AnyPlant
 from opspace.loop.loop import Observer as Observer
 from opspace.loop.loop import Outcome as Outcome
 from opspace.loop.loop import Stepping as Stepping
 from opspace.loop.loop import StopRule as StopRule
 from opspace.loop.loop import simulate as simulate
-from opspace.loop.plant import Plant as Plant

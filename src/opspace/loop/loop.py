@@ -11,7 +11,7 @@ import numpy as np
 
 from opspace.command import Command
 from opspace.errors import InputError
-from opspace.loop.plant import Plant
+from opspace.loop.any_plant import AnyPlant
 from opspace.robots.protocol import Robot
 
 
@@ -77,7 +77,7 @@ class Outcome:
 
 
 def simulate(
-    plant: Plant,
+    plant: AnyPlant,
     controller: Stepping,
     duration: float,
     observers: Sequence[Observer] = (),
@@ -88,7 +88,7 @@ def simulate(
     A second call goes on where the first one ended.
 
     Args:
-        plant: The robot, for example `opspace.sim.MujocoPlant`.
+        plant: The robot, for example `opspace.sim.Plant`.
         controller: The controller.
         duration: Simulated time, s.
         observers: Told about every tick before the plant advances.

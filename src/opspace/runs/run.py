@@ -17,7 +17,7 @@ from opspace.scenario.events import late_tasks, levels_visited
 from opspace.scenario.load import dump_scenario
 from opspace.scenario.references import return_time
 from opspace.scenario.schema import Scenario
-from opspace.sim import MujocoPlant
+from opspace.sim import Plant
 from opspace.tasks import Task
 
 METRICS = "metrics.json"
@@ -114,7 +114,7 @@ def recorded_levels(built: Built, *, everywhere: bool) -> dict[float, list[Task]
     }
 
 
-def truth_of(plant: MujocoPlant) -> State | None:
+def truth_of(plant: Plant) -> State | None:
     """Return what tells the true state where the sensors are noisy."""
     return (lambda: (plant.q, plant.v)) if plant.noisy else None
 

@@ -17,7 +17,7 @@ from opspace.scenario.build_tasks import build_tasks, check_configuration, confi
 from opspace.scenario.events import in_order, insertion_level, late_tasks
 from opspace.scenario.load import to_dict
 from opspace.scenario.schema import Scenario
-from opspace.sim import Disturbances, MujocoPlant, Push
+from opspace.sim import Disturbances, Plant, Push
 from opspace.stack import Stack
 from opspace.tasks import JointLimits, Task
 
@@ -46,7 +46,7 @@ class Built:
     stack: Stack
     tasks: Mapping[str, Task]
     controller: ReferenceController
-    plant: MujocoPlant
+    plant: Plant
     stop: StopRule
 
     @property
@@ -95,10 +95,10 @@ def build(scenario: Scenario, controller: Callable[..., ReferenceController] = C
     return Built(scenario, robot, stack, tasks, driver, plant, stop)
 
 
-def _plant(scenario: Scenario, robot: Robot, q: np.ndarray) -> MujocoPlant:
+def _plant(scenario: Scenario, robot: Robot, q: np.ndarray) -> Plant:
     option = scenario.plant
     try:
-        return MujocoPlant(
+        return Plant(
             robot,
             q,
             dt=scenario.dt,

@@ -2,4 +2,4 @@
 
 from opspace.sim.disturbances import Disturbances as Disturbances
 from opspace.sim.disturbances import Push as Push
-from opspace.sim.mujoco_plant import MujocoPlant as MujocoPlant
+from opspace.sim.mujoco_plant import Plant as Plant

@@ -22,7 +22,7 @@ def _import_mujoco() -> Any:
     return mujoco
 
 
-class MujocoPlant:
+class Plant:
     """A robot in MuJoCo with nothing between the command and its joints but what is asked for.
 
     Args:
@@ -102,7 +102,7 @@ class MujocoPlant:
     def __repr__(self) -> str:
         fastest = float(np.max(np.abs(self.v), initial=0.0))
         return (
-            f"MujocoPlant({self._robot.name!r}, t={self.t:g} s, dt={self.dt:g} s, "
+            f"Plant({self._robot.name!r}, t={self.t:g} s, dt={self.dt:g} s, "
             f"fastest joint {fastest:.3g} rad/s)"
         )
 

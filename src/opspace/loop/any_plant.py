@@ -7,7 +7,7 @@ from typing import Protocol
 import numpy as np
 
 
-class Plant(Protocol):
+class AnyPlant(Protocol):
     """A robot that is read, and driven by joint torque.
 
     Attributes:
