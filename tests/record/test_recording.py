@@ -273,7 +273,9 @@ def test_a_description_that_cannot_be_kept_is_refused_and_leaves_no_recording(
     write(tmp_path, rows_of(1))
 
 
-@pytest.mark.parametrize(("name", "unit"), [("", "s"), ("q//1", "rad"), ("q/", "rad"), ("q", " ")])
+@pytest.mark.parametrize(
+    ("name", "unit"), [("", "s"), ("/1", "rad"), ("q/", "rad"), ("q/\n", "rad"), ("q", " ")]
+)
 def test_a_column_needs_a_name_and_a_unit(name, unit):
     with pytest.raises(InputError, match=r"column"):
         Column(name, unit)

@@ -12,6 +12,7 @@ from opspace.errors import InputError, missing_extra
 from opspace.export.facts import facts
 from opspace.export.nanoseconds import nanoseconds
 from opspace.record import Column, Recording
+from opspace.record.format import parts_of
 
 try:
     from mcap.well_known import MessageEncoding, SchemaEncoding
@@ -88,7 +89,8 @@ def topics_of(columns: Sequence[Column]) -> dict[str, list[MessageField]]:
     """
     topics: dict[str, list[MessageField]] = {}
     for number, column in enumerate(columns):
-        parts = (ALONE, column.name) if "/" not in column.name else tuple(column.name.split("/"))
+        parts = parts_of(column.name)
+        parts = parts if len(parts) > 1 else (ALONE, column.name)
         depth = 2 if parts[0] in OF_GROUPS and len(parts) > 2 else 1
         fields = topics.setdefault("/" + "/".join(parts[:depth]), [])
         fields.append(MessageField(parts[depth:], number))

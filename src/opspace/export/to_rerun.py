@@ -15,6 +15,7 @@ from opspace.errors import missing_extra
 from opspace.export.facts import facts
 from opspace.export.nanoseconds import nanoseconds
 from opspace.record import Column, Recording
+from opspace.record.format import parts_of
 
 try:
     import rerun as rr
@@ -26,6 +27,7 @@ TIMELINE = "t"
 WORLD = "/world"
 TOOL = ("tool/x", "tool/y", "tool/z")
 
+_JOINTS = {"q": "joint position", "v": "joint velocity", "tau": "joint torque"}
 _COLOR = (0, 68, 136)
 _RADIUS = 0.01
 
@@ -62,8 +64,8 @@ def write(recording: Recording, path: Path) -> Iterator[tuple[int, int]]:
 
 
 def entity(name: str) -> str:
-    """Return the path of a column or a group in Rerun, where some signs need a backslash."""
-    return "/" + "/".join(rr.escape_entity_path_part(part) for part in name.split("/"))
+    """Return the path of a column in Rerun, where some signs need a backslash."""
+    return "/" + "/".join(rr.escape_entity_path_part(part) for part in parts_of(name))
 
 
 def _send_column(
@@ -92,9 +94,8 @@ def _send(stream: rr.RecordingStream, path: str, times: np.ndarray, columns: Any
 def _blueprint(recording: Recording) -> rrb.Blueprint:
     """Show the tool in space beside positions, velocities, torques, activations and errors."""
     plots = [
-        rrb.TimeSeriesView(name=title, contents=[f"+ {entity(name)}" for name in names])
-        for title, names in _plots(recording).items()
-        if names
+        rrb.TimeSeriesView(name=title, contents=[f"+ {entity(column.name)}" for column in columns])
+        for title, columns in _plots(recording).items()
     ]
     views: list[Any] = [rrb.Vertical(*plots)] if plots else []
     if all(name in recording for name in TOOL):
@@ -102,15 +103,16 @@ def _blueprint(recording: Recording) -> rrb.Blueprint:
     return rrb.Blueprint(rrb.Horizontal(*views), collapse_panels=True)
 
 
-def _plots(recording: Recording) -> dict[str, list[str]]:
-    """Return the columns of each plot by its title."""
-    names = recording.names
-    tasks = [name for name in names if name.startswith("tasks/")]
-    active = [name for name in tasks if name.endswith("/activation")]
-    return {
-        "joint position [rad]": [name for name in names if name.startswith("q/")],
-        "joint velocity [rad/s]": [name for name in names if name.startswith("v/")],
-        "joint torque [N·m]": [name for name in names if name.startswith("tau/")],
-        "activation of tasks": active,
-        "error of tasks": [name for name in tasks if name not in active],
-    }
+def _plots(recording: Recording) -> dict[str, list[Column]]:
+    """Return the columns of each plot by its title; what slides is not in one with what turns."""
+    plots: dict[str, list[Column]] = {}
+    for column in recording.columns:
+        group, *inner = parts_of(column.name)
+        if group in _JOINTS and inner:
+            title = f"{_JOINTS[group]} [{column.unit}]"
+        elif group == "tasks":
+            title = "activation of tasks" if inner[-1:] == ["activation"] else "error of tasks"
+        else:
+            continue
+        plots.setdefault(title, []).append(column)
+    return plots

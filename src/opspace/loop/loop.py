@@ -12,6 +12,7 @@ import numpy as np
 from opspace.command import Command
 from opspace.errors import InputError
 from opspace.loop.any_plant import AnyPlant
+from opspace.robots.joint_units import effort_unit, joint_units
 from opspace.robots.protocol import Robot
 
 
@@ -41,23 +42,25 @@ class StopRule:
     """When a run is given up, as a person at the emergency stop would.
 
     Attributes:
-        max_joint_speed: rad/s; None for no limit.
-        max_torque: Commanded torque of a joint, N·m; None for no limit.
+        max_joint_speed: rad/s or m/s; None for no limit.
+        max_torque: Commanded torque of a joint, N·m or N; None for no limit.
     """
 
     max_joint_speed: float | None = None
     max_torque: float | None = None
 
-    def reason(self, joints: Sequence[str], v: np.ndarray, tau: np.ndarray) -> str:
+    def reason(self, robot: Robot, v: np.ndarray, tau: np.ndarray) -> str:
         """Say why to stop, or the empty string."""
         if not (np.all(np.isfinite(v)) and np.all(np.isfinite(tau))):
             return "the simulation diverged"
         if self.max_joint_speed is not None and np.max(np.abs(v)) > self.max_joint_speed:
             worst = int(np.argmax(np.abs(v)))
-            return f"joint {joints[worst]!r} moved at {abs(v[worst]):.1f} rad/s"
+            unit = joint_units(robot)[worst]
+            return f"joint {robot.joint_names[worst]!r} moved at {abs(v[worst]):.1f} {unit}/s"
         if self.max_torque is not None and np.max(np.abs(tau)) > self.max_torque:
             worst = int(np.argmax(np.abs(tau)))
-            return f"joint {joints[worst]!r} was asked for {abs(tau[worst]):.0f} N·m"
+            unit = effort_unit(joint_units(robot)[worst])
+            return f"joint {robot.joint_names[worst]!r} was asked for {abs(tau[worst]):.0f} {unit}"
         return ""
 
 
@@ -102,7 +105,6 @@ def simulate(
     """
     if not (math.isfinite(duration) and duration >= 0.0):
         raise InputError(f"the duration must be finite and >= 0 s, got {duration}")
-    joints = controller.robot.joint_names
     start = plant.t
     t = start
     for tick in range(round(duration / plant.dt)):
@@ -113,7 +115,7 @@ def simulate(
         command = controller.step(t, q, v)
         for observer in observers:
             observer.observe(q, v, command)
-        reason = stop.reason(joints, plant.v, command.tau)
+        reason = stop.reason(controller.robot, plant.v, command.tau)
         if reason:
             return Outcome(False, t, reason)
         plant.advance(command.tau)

@@ -31,6 +31,7 @@ except ImportError as error:
     raise missing_extra("pillow" if error.name == "PIL" else "mujoco", "sim") from None
 
 from opspace.robots.mujoco_model import mujoco_model
+from opspace.robots.mujoco_names import joint_names
 
 __all__ = ["SnapshotUnavailableError", "render", "snapshot_strip", "snapshots"]
 
@@ -203,7 +204,8 @@ def _tick(model: mujoco.MjModel, recording: Recording, time: float, task: str) -
 def _coordinates(model: mujoco.MjModel) -> list[tuple[int, int, str]]:
     """Return where each joint lies in qpos and the name of its column or columns."""
     edges = [*model.jnt_qposadr.tolist(), model.nq]
-    return [(a, b, f"q/{model.joint(j).name}") for j, (a, b) in enumerate(pairwise(edges))]
+    ranges = zip(joint_names(model), pairwise(edges), strict=True)
+    return [(a, b, f"q/{name}") for name, (a, b) in ranges]
 
 
 def _choose_view(

@@ -14,6 +14,7 @@ from __future__ import annotations
 import json
 import os
 import platform
+import unicodedata
 from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib import metadata
@@ -50,7 +51,8 @@ class Column:
     """One recorded quantity.
 
     Attributes:
-        name: Path-like name, for example ``tau/joint1``.
+        name: Path-like name, for example ``tau/joint1``; what joints and tasks are called stands in
+            it as it is.
         unit: SI unit, ``1`` for a number without one.
         description: What it is, in words.
     """
@@ -60,11 +62,35 @@ class Column:
     description: str = ""
 
     def __post_init__(self) -> None:
-        parts = self.name.split("/")
-        if not (all(part and part == part.strip() for part in parts) and self.name.isprintable()):
-            raise InputError(f"column name {self.name!r} must be words joined by single slashes")
+        if not all(map(str.strip, parts_of(self.name))) or not _fits_a_line(self.name):
+            raise InputError(
+                f"column name {self.name!r} must be words on one line, after a group and a slash or "
+                "alone"
+            )
         if not (self.unit.strip() and self.unit.isprintable()):
             raise InputError(f"column {self.name!r} needs a unit ('1' for a number without one)")
+
+
+def parts_of(name: str) -> tuple[str, ...]:
+    """Take the name of a column apart.
+
+    Args:
+        name: The name, such as ``tasks/position/error/0``.
+
+    Returns:
+        The groups that it is in, from the outside to the inside, and its own name in the last. A
+        joint that is called ``/arm/joint1`` is one part.
+    """
+    group, slash, rest = name.partition("/")
+    if not slash:
+        return (group,)
+    inner = rest.split("/")
+    return (group, *inner) if all(map(str.strip, inner)) else (group, rest)
+
+
+def _fits_a_line(text: str) -> bool:
+    """Whether a text has no sign that ends a line or is none."""
+    return all(unicodedata.category(sign) not in ("Cc", "Zl", "Zp", "Cs") for sign in text)
 
 
 @dataclass(frozen=True)

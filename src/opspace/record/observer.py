@@ -14,6 +14,7 @@ from opspace.record.format import Column, Ended
 from opspace.record.subject import subject_of
 from opspace.record.writer import Recorder
 from opspace.robots import Robot
+from opspace.robots.joint_units import effort_unit, joint_units
 from opspace.tasks import Task
 
 State = Callable[[], tuple[np.ndarray, np.ndarray]]
@@ -31,14 +32,16 @@ STATUS = Column("status", "1", "status flags of the command")
 
 def state_columns(robot: Robot) -> list[Column]:
     """List the columns t, q, v and tau of a robot's recording."""
-    columns = [Column("t", "s", "time")]
-    for group, unit, what in (
-        ("q", "rad", "joint position"),
-        ("v", "rad/s", "joint velocity"),
-        ("tau", "N·m", "commanded joint torque, bias included"),
-    ):
-        columns += [Column(f"{group}/{j}", unit, f"{what} of {j}") for j in robot.joint_names]
-    return columns
+    joints = list(zip(robot.joint_names, joint_units(robot), strict=True))
+    return [
+        Column("t", "s", "time"),
+        *(Column(f"q/{j}", unit, f"joint position of {j}") for j, unit in joints),
+        *(Column(f"v/{j}", f"{unit}/s", f"joint velocity of {j}") for j, unit in joints),
+        *(
+            Column(f"tau/{j}", effort_unit(unit), f"commanded joint torque, bias included of {j}")
+            for j, unit in joints
+        ),
+    ]
 
 
 def columns_of(
@@ -204,12 +207,9 @@ def _level(found: TaskStatus) -> float:
 
 def _truth_columns(controller: ReferenceController) -> list[Column]:
     return [
-        Column(f"true/{group}/{joint}", unit, f"{what} of {joint}, without the sensors' noise")
-        for group, unit, what in (
-            ("q", "rad", "joint position"),
-            ("v", "rad/s", "joint velocity"),
-        )
-        for joint in controller.robot.joint_names
+        Column(f"true/{group}/{j}", unit + rate, f"{what} of {j}, without the sensors' noise")
+        for group, rate, what in (("q", "", "joint position"), ("v", "/s", "joint velocity"))
+        for j, unit in zip(controller.robot.joint_names, joint_units(controller.robot), strict=True)
     ]
 
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from opspace.controller import ReferenceController
 from opspace.robots.catalogue import CATALOGUE, locate
+from opspace.robots.joint_units import joint_units
 from opspace.robots.protocol import Robot
 from opspace.tasks import Task
 from opspace.tasks.leading import can_be_led
@@ -25,7 +26,7 @@ def subject_of(controller: ReferenceController, tasks: Sequence[Task] = ()) -> d
         tasks: Tasks that are not in its stack yet.
 
     Returns:
-        ``robot`` (name or file, joints, their limits in rad or m, torque limits in N·m, the buffer
+        ``robot`` (name or file, joints, their units and limits in rad or m, torque limits, the buffer
         before a limit in rad or m, and by limit the acceleration that its joint brakes with; null
         where there is none) and ``tasks`` (units, stiffness, level, and what its target can be led
         to).
@@ -52,6 +53,7 @@ def _robot(controller: ReferenceController) -> dict[str, Any]:
         "locked_joints": list(robot.locked_joints),
         "tool": robot.tool,
         "joints": list(robot.joint_names),
+        "units": list(joint_units(robot)),
         "lower": _finite(lower),
         "upper": _finite(upper),
         "torque_limit": _finite(robot.torque_limit),

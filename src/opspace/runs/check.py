@@ -12,6 +12,8 @@ from opspace.controller import Controller
 from opspace.errors import InputError
 from opspace.plan.calibration import BRAKE_RANGE, Calibration
 from opspace.plan.scales import Singularity
+from opspace.robots.adapter import AdapterBase
+from opspace.robots.joint_units import joint_units
 from opspace.robots.protocol import Robot
 from opspace.stack import Stack
 from opspace.tasks import OrientationTask, PositionTask, Task
@@ -26,16 +28,18 @@ class JointReport:
 
     Attributes:
         name: Its name.
+        unit: Of its position, rad or m.
         reference: Position in the reference posture, rad or m.
         lower: Lower limit, rad or m.
         upper: Upper limit, rad or m.
         max_velocity: rad/s or m/s.
         max_torque: N·m or N.
-        gravity: Torque that holds the reference posture, N·m or N.
+        gravity: Torque that holds the reference posture, N·m or N; springs of the file count.
         brake: Acceleration with which joint limits count on braking, rad/s² or m/s².
     """
 
     name: str
+    unit: str
     reference: float
     lower: float | None
     upper: float | None
@@ -108,7 +112,7 @@ def check_robot(robot: Robot) -> RobotCheck:
         sigma=sigma,
         scale=scale,
         buffer=(option.lower, option.upper),
-        warnings=(*warnings, *_joint_warnings(joints)),
+        warnings=(*_of_file(robot), *warnings, *_joint_warnings(joints)),
     )
 
 
@@ -133,21 +137,28 @@ def _sigma(controller: Controller) -> tuple[float, ...]:
 def _joints(robot: Robot, calibration: Calibration | None) -> tuple[JointReport, ...]:
     base = robot.nq - int(np.sum(robot.actuated))
     reference = robot.q_reference[base:]
+    units = joint_units(robot)
     found = []
     for place, i in enumerate(np.flatnonzero(robot.actuated)):
         found.append(
             JointReport(
                 name=robot.joint_names[i],
+                unit=units[i],
                 reference=float(reference[place]),
                 lower=_known(robot.q_lower[i]),
                 upper=_known(robot.q_upper[i]),
                 max_velocity=_known(robot.velocity_limit[i]),
                 max_torque=_known(robot.torque_limit[i]),
-                gravity=float(robot.gravity[i]),
+                gravity=float(robot.bias[i]),
                 brake=None if calibration is None else float(calibration.brake[i]),
             )
         )
     return tuple(found)
+
+
+def _of_file(robot: Robot) -> tuple[str, ...]:
+    """Return what was found when the file was read; a robot of one's own has none."""
+    return robot.description.warnings if isinstance(robot, AdapterBase) else ()
 
 
 def _known(value: float) -> float | None:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 from opspace.record import Recording
+from opspace.robots.joint_units import effort_unit
 from opspace.runs.check import JointReport
 from opspace.runs.metrics import UNITS, Metrics, largest_torque_step
 from opspace.scenario.events import Event, in_order
@@ -62,20 +63,24 @@ def joints_table(joints: Sequence[JointReport]) -> tuple[list[str], list[list[st
     Returns:
         Heads with units, and rows.
     """
+    units = list(dict.fromkeys(j.unit for j in joints)) or ["rad"]
+
+    def measured(what: str, wanted: Callable[[str], str]) -> str:
+        return f"{what} [{', '.join(map(wanted, units))}]"
+
     heads = [
         "joint",
-        "reference [rad]",
-        "lower [rad]",
-        "upper [rad]",
-        "speed [rad/s]",
-        "torque [N·m]",
-        "gravity [N·m]",
-        "brake [rad/s²]",
+        *(measured(what, str) for what in ("reference", "lower", "upper")),
+        measured("speed", "{}/s".format),
+        *(measured(what, effort_unit) for what in ("torque", "gravity")),
+        measured("brake", "{}/s²".format),
     ]
     rows = []
     for j in joints:
         numbers = (j.reference, j.lower, j.upper, j.max_velocity, j.max_torque, j.gravity, j.brake)
-        rows.append([j.name, *map(_written, numbers)])
+        # Where slides stand among hinges, a row says which of the units is its own.
+        name = j.name if len(units) == 1 else f"{j.name} [{j.unit}]"
+        rows.append([name, *map(_written, numbers)])
     return heads, rows
 
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from opspace.errors import InputError, unknown_name
+from opspace.robots.joint_units import joint_units
 from opspace.tasks.rotation import ORTHONORMAL_TOLERANCE
 from opspace.tasks.validation import Array
 
@@ -101,7 +102,7 @@ def joint_layout(robot: Robot, joints: Sequence[str] | None) -> Layout:
     J = np.eye(robot.nv)[coordinates]
     drift = np.zeros(len(coordinates))
     J.flags.writeable = drift.flags.writeable = False
-    units = _units(robot)
+    units = joint_units(robot)
     return Layout(
         coordinates=np.array(coordinates),
         entries=np.array(entries),
@@ -161,7 +162,3 @@ def _belongs(coordinate: str, joint: str) -> bool:
     """Whether a coordinate is the joint of this name or one of its "joint/0", "joint/1", ..."""
     prefix, _, number = coordinate.rpartition("/")
     return coordinate == joint or (prefix == joint and number.isdigit())
-
-
-def _units(robot: Robot) -> Sequence[str]:
-    return getattr(robot, "joint_units", ("rad",) * robot.nv)

@@ -13,6 +13,7 @@ from typing import Any
 from opspace.errors import InputError, missing_extra
 from opspace.record.growing import GrowingRecording
 from opspace.robots import Robot, load_robot
+from opspace.robots.joint_units import effort_unit
 
 try:
     import viser
@@ -173,7 +174,9 @@ class Page:
     def _add_charts(self) -> list[Chart]:
         """Make the charts, for which there must be a tick to draw."""
         reader = self._reader
-        shown = {"torque [N·m] over time [s]": torque_columns(reader)}
+        units = self._about["robot"].get("units") or ["rad"]
+        efforts = ", ".join(dict.fromkeys(map(effort_unit, units)))
+        shown = {f"torque [{efforts}] over time [s]": torque_columns(reader)}
         if weakest := sigma_columns(reader):
             shown["weakest σ of a level [1], 0 without one, over time [s]"] = weakest
         with self._chart_tab:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from opspace.command import Status
+from opspace.robots.joint_units import effort_unit
 from opspace.view.frame import Frame, LevelFrame, TaskFrame
 
 ACTIVE, FADED, GONE = "#004488", "#BB5566", "#c4c4c4"
@@ -82,11 +83,13 @@ def joints(frame: Frame, names: Sequence[str], robot: Mapping[str, Any]) -> str:
         '<span style="flex:0 0 64px">torque</span></div>'
     ]
     free = len(frame.q) - len(names)
+    units = robot.get("units") or ["rad"] * len(names)
     for i, name in enumerate(names):
         lower, upper = robot["lower"][i], robot["upper"][i]
         place = frame.q[i + free] if free == 0 or i >= 6 else math.nan
         gauge = _range(frame, name, i, float(place), lower, upper, robot)
-        torque = _torque(float(frame.tau[i]), robot["torque_limit"][i])
+        unit = effort_unit(units[i])
+        torque = _torque(float(frame.tau[i]), robot["torque_limit"][i], unit)
         label = f'<span style="{_NAME}" title="{escape(name)}">{escape(short(name, names))}</span>'
         rows.append(f'<div style="{_ROW}">{label}{gauge}{torque}</div>')
     return _panel(rows)
@@ -181,15 +184,15 @@ def _zone(robot: Mapping[str, Any], side: str, speed: float, span: float) -> flo
     return min(max(width / span, 0.02), 0.5)
 
 
-def _torque(tau: float, limit: float | None) -> str:
+def _torque(tau: float, limit: float | None, unit: str) -> str:
     if not limit:
-        return f'<span style="{_NUMBER};flex-basis:64px">{tau:.1f} N·m</span>'
+        return f'<span style="{_NUMBER};flex-basis:64px">{tau:.1f} {unit}</span>'
     part = min(abs(tau) / limit, 1.0)
     color = FADED if part >= 0.999 else ACTIVE
     edge = "left:50%" if tau >= 0.0 else "right:50%"
     return (
         '<span style="flex:0 0 64px;position:relative;height:12px;border-radius:3px;'
-        f'background:rgba(140,140,140,0.22)" title="{tau:.2f} N·m of {limit:g}">'
+        f'background:rgba(140,140,140,0.22)" title="{tau:.2f} {unit} of {limit:g}">'
         f'<span style="position:absolute;top:0;bottom:0;{edge};width:{50.0 * part:.1f}%;'
         f'background:{color}"></span></span>'
     )

@@ -1,0 +1,78 @@
+"""Recordings and exports of robots whose joints slide, or have names with slashes and spaces."""
+
+import csv
+import json
+
+import numpy as np
+import pytest
+
+import opspace as osc
+from opspace.export import export
+
+NAMES = ("/arm/lift", "left/turn", "Gelenk drei ä", "j 4")
+ARM = """<mujoco><worldbody><body name="a"><joint name="{}" type="slide" axis="0 0 1" range="0 .5"/>
+<geom size=".1" mass="2"/><body><joint name="{}" axis="0 1 0" range="-90 90"/>
+<geom type="capsule" fromto="0 0 0 .3 0 0" size=".03"/><body pos=".3 0 0">
+<joint name="{}" axis="0 1 0"/><geom type="capsule" fromto="0 0 0 .3 0 0" size=".03"/>
+<body pos=".3 0 0"><joint name="{}" type="slide" axis="1 0 0"/>
+<geom type="capsule" fromto="0 0 0 .3 0 0" size=".03"/></body></body></body></body></worldbody>
+</mujoco>"""
+
+
+@pytest.fixture
+def recording(tmp_path):
+    path = tmp_path / "arm.xml"
+    path.write_text(ARM.format(*NAMES))
+    robot = osc.load_robot(path)
+    controller = osc.Controller(robot, osc.Stack([osc.JointLimits(), osc.PostureTask()]))
+    recorder = osc.TickRecorder(tmp_path / "run", controller, {})
+    plant = osc.Plant(robot, robot.q_reference)
+    osc.simulate(plant, controller, 0.005, [recorder])
+    recorder.close()
+    return osc.load(tmp_path / "run")
+
+
+def test_what_slides_is_recorded_in_metres_and_newtons(recording):
+    lengths = ("m", "rad", "rad", "m")
+    for name, unit in zip(NAMES, lengths, strict=True):
+        assert recording.units[f"q/{name}"] == unit
+        assert recording.units[f"v/{name}"] == f"{unit}/s"
+        assert recording.units[f"tau/{name}"] == ("N" if unit == "m" else "N·m")
+    rows = [recording.units[f"tasks/posture/error/{i}"] for i in range(4)]
+    assert tuple(rows) == lengths == tuple(recording.header["robot"]["units"])
+    assert recording.members("q") == tuple(f"q/{name}" for name in NAMES)
+
+
+def test_odd_names_reach_every_format(recording, tmp_path):
+    assert export(recording, tmp_path / "run.csv").is_file()
+    with (tmp_path / "run.csv").open(encoding="utf-8") as file:
+        heads = next(csv.reader(file))
+    assert "tau//arm/lift [N]" in heads
+    assert "q/Gelenk drei ä [rad]" in heads
+    mcap = pytest.importorskip("mcap.reader")
+    export(recording, tmp_path / "run.mcap")
+    with (tmp_path / "run.mcap").open("rb") as file:
+        _, channel, message = next(
+            iter(mcap.make_reader(file).iter_messages(topics=["/q"])), (None, None, None)
+        )
+        found = json.loads(message.data)
+    assert channel.topic == "/q"
+    assert found["/arm/lift"] == recording["q//arm/lift"][0]
+    assert found["left"]["turn"] == recording["q/left/turn"][0]
+    pytest.importorskip("rerun")
+    assert export(recording, tmp_path / "run.rrd").stat().st_size > 0
+
+
+def test_a_stop_and_a_check_say_newtons(recording, tmp_path):
+    from opspace.runs.check import check_robot
+    from opspace.runs.tables import joints_table
+
+    robot = osc.load_robot(tmp_path / "arm.xml")
+    rule = osc.StopRule(max_joint_speed=1.0, max_torque=1.0)
+    assert rule.reason(robot, np.array([2.0, 0, 0, 0]), np.zeros(4)).endswith("at 2.0 m/s")
+    assert rule.reason(robot, np.zeros(4), np.array([5.0, 0, 0, 0])).endswith("asked for 5 N")
+    assert rule.reason(robot, np.zeros(4), np.array([0, 5.0, 0, 0])).endswith("for 5 N·m")
+    heads, rows = joints_table(check_robot(robot).joints)
+    assert heads[1] == "reference [m, rad]"
+    assert heads[5] == "torque [N, N·m]"
+    assert [row[0] for row in rows][:2] == ["/arm/lift [m]", "left/turn [rad]"]
