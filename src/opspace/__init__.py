@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from opspace.errors import InputError as InputError
     from opspace.errors import MissingExtraError as MissingExtraError
     from opspace.errors import ModelError as ModelError
+    from opspace.errors import ModelWarning as ModelWarning
     from opspace.errors import OpspaceError as OpspaceError
     from opspace.errors import RecordingError as RecordingError
     from opspace.errors import ScenarioError as ScenarioError
@@ -85,7 +86,7 @@ _NAMES = {
     "opspace.command": "Command LevelStatus Status TaskStatus",
     "opspace.controller": "Controller",
     "opspace.errors": (
-        "InputError MissingExtraError ModelError OpspaceError RecordingError ScenarioError "
+        "InputError MissingExtraError ModelError ModelWarning OpspaceError RecordingError ScenarioError "
         "UnknownNameError"
     ),
     "opspace.law": (

@@ -8,6 +8,7 @@ import json
 import os
 import sys
 import time
+import warnings
 from collections.abc import Sequence
 from dataclasses import asdict
 from enum import Enum
@@ -16,7 +17,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from opspace.errors import OpspaceError
+from opspace.errors import ModelWarning, OpspaceError
 
 if TYPE_CHECKING:
     from opspace.runs.run import RunResult
@@ -54,7 +55,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
         if isinstance(stream, io.TextIOWrapper):
             # A terminal that knows no "·" shows something else in its place.
             stream.reconfigure(errors="replace")
-    status = _status(arguments)
+    with warnings.catch_warnings():
+        warnings.showwarning = _warn
+        status = _status(arguments)
     try:
         sys.stdout.flush()
     except BrokenPipeError:
@@ -77,6 +80,10 @@ def _status(arguments: Sequence[str] | None) -> int:
     if status == INTERRUPTED:
         print("opspace: interrupted", file=sys.stderr)
     return status if isinstance(status, int) else 0
+
+
+def _warn(message: Warning | str, *_: object) -> None:
+    print(f"opspace: warning: {' '.join(str(message).split())}", file=sys.stderr)
 
 
 def _refuse(message: str) -> int:
@@ -365,7 +372,9 @@ def check(
     from opspace.runs.check import check_robot, to_plain
     from opspace.runs.tables import joints_table
 
-    report = check_robot(load_robot(robot))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ModelWarning)  # the report has them
+        report = check_robot(load_robot(robot))
     if as_json:
         print(json.dumps(to_plain(report), indent=1, ensure_ascii=False))
         return

@@ -42,6 +42,10 @@ class ModelError(OpspaceError):
     """A robot file that cannot be read or used."""
 
 
+class ModelWarning(UserWarning):
+    """What a robot file says and the controller does not follow."""
+
+
 class RecordingError(OpspaceError):
     """A recording that cannot be written or read."""
 

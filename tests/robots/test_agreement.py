@@ -10,6 +10,9 @@ import pytest
 from opspace.robots import Robot, load_robot
 from tests.robots.samples import NAMES, random_state
 
+# Its motors are not alike in both directions, see tests/robots/test_motors.py.
+pytestmark = pytest.mark.filterwarnings("ignore:medley. the motor of")
+
 QUANTITIES = ("M", "bias", "gravity")
 OF_FRAMES = ("position", "rotation", "velocity", "jacobian", "drift")
 OF_MASS = ("com_position", "com_jacobian", "com_drift")

@@ -16,6 +16,9 @@ from opspace.robots.bodies import make_dynamics
 from opspace.robots.rigid_model import rigid_model
 from tests.robots.samples import BACKENDS, NAMES, random_state
 
+# Its motors are not alike in both directions, see tests/robots/test_motors.py.
+pytestmark = pytest.mark.filterwarnings("ignore:medley. the motor of")
+
 
 def assert_same(robot: Robot, seed: int, fast: float = 1.0) -> None:
     """Compare everything at a random state, with velocities up to some times ``fast``."""

@@ -14,6 +14,9 @@ from opspace.errors import InputError, UnknownNameError
 from opspace.robots import Robot, load_robot
 from tests.robots.samples import BACKENDS, random_state
 
+# Its motors are not alike in both directions, see tests/robots/test_motors.py.
+pytestmark = pytest.mark.filterwarnings("ignore:medley. the motor of")
+
 
 @pytest.fixture(params=BACKENDS)
 def robot(request: pytest.FixtureRequest, files: dict[str, Path]) -> Robot:

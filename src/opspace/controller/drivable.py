@@ -9,7 +9,7 @@ from opspace.robots.protocol import Robot
 
 
 def check_drivable(robot: Robot) -> None:
-    """Check that a robot has one motor for every coordinate.
+    """Check that a robot has one motor for every coordinate, with torque in both directions.
 
     Raises:
         InputError: It has not.
@@ -24,4 +24,12 @@ def check_drivable(robot: Robot) -> None:
         raise InputError(
             f"robot {robot.name!r} has joints with several coordinates (nq={robot.nq}, "
             f"n={robot.nv}); this controller takes hinges and slides only"
+        )
+    weak = [
+        n for n, most in zip(robot.joint_names, robot.torque_limit, strict=True) if not most > 0
+    ]
+    if weak:
+        raise InputError(
+            f"robot {robot.name!r} has motors without torque in one direction or both: "
+            f"{', '.join(weak)}"
         )

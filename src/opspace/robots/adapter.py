@@ -37,6 +37,7 @@ class AdapterBase(ABC):
         self.nq = description.nq
         self.nv = description.nv
         self.joint_names = description.joint_names
+        self.joint_units = description.joint_units
         self.frame_names = description.frame_names
         self.tool = description.tool
         self.q_reference = _frozen(description.q_reference)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -20,6 +20,8 @@ class Description:
 
     Attributes:
         quaternions: Index in q of the first coordinate (w) of every quaternion.
+        joint_units: (nv,) unit of each coordinate's position, "rad" or "m".
+        warnings: What the file says and the controller does not follow, a sentence each.
     """
 
     name: str
@@ -27,6 +29,7 @@ class Description:
     nq: int
     nv: int
     joint_names: tuple[str, ...]
+    joint_units: tuple[str, ...]
     frame_names: tuple[str, ...]
     tool: str
     q_reference: np.ndarray
@@ -39,6 +42,7 @@ class Description:
     floating_base: bool = False
     locked_joints: tuple[str, ...] = ()
     configurations: Mapping[str, np.ndarray] = field(default_factory=dict)
+    warnings: tuple[str, ...] = ()
 
 
 def mid_range(lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
@@ -55,3 +59,19 @@ def mid_range(lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
     middle = np.zeros(len(lower))
     middle[limited] = 0.5 * (lower[limited] + upper[limited])
     return middle
+
+
+def unused(name: str, taken: Collection[str], longer: str = "{}_") -> str:
+    """Make a name longer until nothing else is called that.
+
+    Args:
+        name: The name that is wanted.
+        taken: Names that are given already.
+        longer: How one is made of another.
+
+    Returns:
+        The name, or one made of it.
+    """
+    while name in taken:
+        name = longer.format(name)
+    return name

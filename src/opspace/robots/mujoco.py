@@ -11,6 +11,7 @@ import numpy as np
 from opspace.robots.adapter import AdapterBase
 from opspace.robots.description import Description
 from opspace.robots.motion_axes import FramePlace, MassPoint, MotionAxes
+from opspace.robots.mujoco_names import frames
 from opspace.robots.pinocchio_model import frame_ids, model_from_mujoco
 from opspace.robots.rigid_model import RigidModel, rigid_model
 from opspace.robots.world_axes import placements, world_axes
@@ -29,11 +30,9 @@ class MujocoRobot(AdapterBase):
         super().__init__(description)
         self._model = model
         self._data = mujoco.MjData(model)
-        self._sites = [_site(model, name) for name in self.frame_names]
-        self._bodies = [
-            model.body(name).id if site < 0 else int(model.site_bodyid[site])
-            for name, site in zip(self.frame_names, self._sites, strict=True)
-        ]
+        places = {frame.name: frame for frame in frames(model)}
+        self._sites = [places[name].site for name in self.frame_names]
+        self._bodies = [places[name].body for name in self.frame_names]
         moving = model.body_weldid > 0
         self._massive = np.flatnonzero(moving & (model.body_mass > 0.0)).tolist()
         self._mass = model.body_mass * moving
@@ -189,9 +188,3 @@ class MujocoRobot(AdapterBase):
             mujoco.mj_jacDot(self._model, self._data, Jdot, None, point, body)
             total += self._mass[body] * Jdot
         return total @ self._v / self._total_mass
-
-
-def _site(model: mujoco.MjModel, name: str) -> int:
-    """Return the id of the site of this name, or -1 where a body has it."""
-    is_body = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, name) >= 0
-    return -1 if is_body else mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SITE, name)

@@ -13,13 +13,25 @@ import numpy as np
 
 from opspace.errors import ModelError
 from opspace.robots.description import BASE_JOINT, WORLD, Description, mid_range
+from opspace.robots.joint_units import effort_unit
+from opspace.robots.mujoco_motors import ON_JOINT, motor_warnings, read_motors
+from opspace.robots.mujoco_names import (
+    BALL,
+    FREE,
+    WIDTHS,
+    NamedFrame,
+    coordinate_names,
+    frames,
+    key_names,
+    shared_names,
+)
 from opspace.robots.mujoco_scene import add_scenery, add_skeleton
 from opspace.robots.urdf import Urdf, read_urdf
 from opspace.robots.urdf_export import inertia, to_xml
 
 # MuJoCo refuses a moving body without mass. A picogram adds less than rounding does.
 NEGLIGIBLE = 1e-12
-FREE, BALL, SLIDE, HINGE = range(4)
+SLIDE, HINGE = 2, 3
 
 
 def mujoco_model(
@@ -135,6 +147,9 @@ def compile_spec(spec: mujoco.MjSpec, path: Path) -> mujoco.MjModel:
         raise _refused(path, error) from None
     if np.any(model.tendon_armature):
         raise ModelError(f"{path}: tendon armature is not supported")
+    armature = np.flatnonzero(getattr(model, "actuator_armature", ()))  # since MuJoCo 4
+    if not np.isin(model.actuator_trntype[armature], ON_JOINT).all():
+        raise ModelError(f"{path}: armature of actuators that are not on a joint is not supported")
     return model
 
 
@@ -148,43 +163,55 @@ def describe_mujoco(model: mujoco.MjModel, path: Path) -> Description:
     Returns:
         The description.
     """
-    names, quaternions = _coordinates(model)
+    names, found = coordinate_names(model), frames(model)
     free = model.jnt_type[model.dof_jntid] == FREE
     lower, upper = _ranges(model)
-    keys = {model.key(i).name or f"key{i}": np.array(model.key_qpos[i]) for i in range(model.nkey)}
-    frames = _frame_names(model)
+    poses = map(np.array, model.key_qpos)
+    keys = dict(zip(key_names(model), poses, strict=True))
+    motors = read_motors(model, names)
+    units = _units(model)
+    efforts = [effort_unit(unit) for unit in units]
     return Description(
         name=path.stem,
         source=path,
         nq=model.nq,
         nv=model.nv,
         joint_names=names,
-        frame_names=frames,
-        tool=_tool(model, frames),
+        joint_units=units,
+        frame_names=tuple(frame.name for frame in found),
+        tool=_tool(model, found),
         q_reference=keys.get("home", next(iter(keys.values()), _middle(model, lower, upper))),
         q_lower=lower,
         q_upper=upper,
         velocity_limit=np.full(model.nv, np.inf),
-        torque_limit=_torque_limits(model),
+        torque_limit=motors.limit,
         actuated=~free,
-        quaternions=quaternions,
+        quaternions=_quaternions(model),
         floating_base=bool(free.any()),
         configurations=keys,
+        warnings=(*_shared(model), *motor_warnings(motors, names, efforts)),
     )
 
 
-def _coordinates(model: mujoco.MjModel) -> tuple[tuple[str, ...], tuple[int, ...]]:
-    """Return a name per velocity coordinate and where in q the quaternions start."""
-    names: list[str] = []
-    quaternions: list[int] = []
-    for j in range(model.njnt):
-        kind, start = int(model.jnt_type[j]), int(model.jnt_qposadr[j])
-        name = model.joint(j).name or (BASE_JOINT if kind == FREE else f"joint{j}")
-        width = {FREE: 6, BALL: 3}.get(kind, 1)
-        names += [name] if width == 1 else [f"{name}/{i}" for i in range(width)]
-        if width > 1:
-            quaternions.append(start + (3 if kind == FREE else 0))
-    return tuple(names), tuple(quaternions)
+def _units(model: mujoco.MjModel) -> tuple[str, ...]:
+    units: list[str] = []
+    for kind in model.jnt_type:
+        own = {FREE: ("m",) * 3 + ("rad",) * 3, BALL: ("rad",) * 3, SLIDE: ("m",)}
+        units += own.get(int(kind), ("rad",))
+    return tuple(units)
+
+
+def _shared(model: mujoco.MjModel) -> list[str]:
+    return [
+        f"a body and a site are called {name!r}: the frame {name!r} is the body, {site!r} the site"
+        for name, site in shared_names(model).items()
+    ]
+
+
+def _quaternions(model: mujoco.MjModel) -> tuple[int, ...]:
+    """Return where in q the quaternions start."""
+    places = zip(model.jnt_type, model.jnt_qposadr, strict=True)
+    return tuple(int(a) + (3 if k == FREE else 0) for k, a in places if k in WIDTHS)
 
 
 def _ranges(model: mujoco.MjModel) -> tuple[np.ndarray, np.ndarray]:
@@ -243,50 +270,12 @@ def _set_inertia(body: mujoco.MjsBody, urdf: Urdf, link: str) -> None:
     body.mass, body.ipos, body.iquat, body.inertia = mass, center, quat, moments
 
 
-def _frame_names(model: mujoco.MjModel) -> tuple[str, ...]:
-    bodies = [model.body(i).name for i in range(model.nbody)]
-    sites = [model.site(i).name for i in range(model.nsite)]
-    return tuple(dict.fromkeys(name for name in bodies + sites if name))
-
-
-def _tool(model: mujoco.MjModel, frames: Sequence[str]) -> str:
+def _tool(model: mujoco.MjModel, frames: Sequence[NamedFrame]) -> str:
     """Return "tool" where it exists, else the last site or body of the longest chain."""
-    if "tool" in frames:
+    if any(frame.name == "tool" for frame in frames):
         return "tool"
     depth = np.zeros((model.nbody, 2), dtype=int)
     for body in range(1, model.nbody):
         depth[body] = depth[model.body_parentid[body]] + [int(model.body_dofnum[body] > 0), 1]
-    last = max(range(model.nbody), key=lambda body: tuple(depth[body]))
-    sites = [model.site(i).name for i in range(model.nsite) if model.site_bodyid[i] == last]
-    names = [name for name in sites if name] or [model.body(last).name]
-    return names[-1] or frames[-1]
-
-
-def _torque_limits(model: mujoco.MjModel) -> np.ndarray:
-    limit = np.full(model.nv, np.inf)
-    for j in range(model.njnt):
-        if model.jnt_type[j] in (FREE, BALL):
-            continue
-        v = int(model.jnt_dofadr[j])
-        forces = [_actuator_force(model, i) for i in range(model.nu) if _drives(model, i, j)]
-        if model.jnt_actfrclimited[j]:
-            limit[v] = np.min(np.abs(model.jnt_actfrcrange[j]))
-        elif forces:
-            limit[v] = sum(forces)
-    return limit
-
-
-def _drives(model: mujoco.MjModel, actuator: int, joint: int) -> bool:
-    on_joint = model.actuator_trntype[actuator] == mujoco.mjtTrn.mjTRN_JOINT
-    return bool(on_joint and model.actuator_trnid[actuator, 0] == joint)
-
-
-def _actuator_force(model: mujoco.MjModel, actuator: int) -> float:
-    gear = abs(float(model.actuator_gear[actuator, 0]))
-    if model.actuator_forcelimited[actuator]:
-        return gear * float(np.min(np.abs(model.actuator_forcerange[actuator])))
-    motor = model.actuator_biastype[actuator] == mujoco.mjtBias.mjBIAS_NONE
-    if motor and model.actuator_ctrllimited[actuator]:
-        gain = abs(float(model.actuator_gainprm[actuator, 0]))
-        return gear * gain * float(np.min(np.abs(model.actuator_ctrlrange[actuator])))
-    return float("inf")
+    last = max((frame.body for frame in frames), key=lambda body: (*depth[body], -body))
+    return next(frame.name for frame in reversed(frames) if frame.body == last)

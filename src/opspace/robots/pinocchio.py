@@ -125,7 +125,7 @@ class PinocchioRobot(AdapterBase):
 
     def _jacobian(self, frame: int) -> np.ndarray:
         J = pin.getFrameJacobian(self._model, self._data, self._frames[frame], ALIGNED)
-        return np.ascontiguousarray(J)
+        return np.ascontiguousarray(J).reshape(6, self.nv)  # one joint gives a vector
 
     def _drift(self, frame: int) -> np.ndarray:
         if not self._accelerations_known:
@@ -142,7 +142,7 @@ class PinocchioRobot(AdapterBase):
 
     def _com_jacobian(self, _: int) -> np.ndarray:
         J = pin.jacobianCenterOfMass(self._model, self._scratch, self._q_pin)
-        return np.array(J, order="C")
+        return np.array(J, order="C").reshape(3, self.nv)
 
     def _com_drift(self, _: int) -> np.ndarray:
         pin.centerOfMass(self._model, self._scratch, self._q_pin, self._v, self._zero)

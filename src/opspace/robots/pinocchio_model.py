@@ -12,6 +12,7 @@ import pinocchio as pin
 
 from opspace.errors import ModelError
 from opspace.robots.description import BASE_JOINT, WORLD, Description
+from opspace.robots.mujoco_names import frames, joint_names
 from opspace.robots.urdf import Urdf
 from opspace.robots.urdf_export import to_xml
 
@@ -69,22 +70,24 @@ def model_from_mujoco(mj: MjModel) -> Any:
     model = pin.Model()
     model.name = "mjcf"
     model.gravity.linear = np.array(mj.opt.gravity)
+    joints = joint_names(mj)
     attached = [(0, pin.SE3.Identity())]
     for body in range(1, mj.nbody):
         joint, place = attached[mj.body_parentid[body]]
         place = place * _placement(mj.body_quat[body], mj.body_pos[body])
         first = int(mj.body_jntadr[body])
         for j in range(first, first + int(mj.body_jntnum[body])):
-            joint, place = _add_joint(model, mj, j, joint, place)
+            joint, place = _add_joint(model, mj, j, joints[j], joint, place)
         attached.append((joint, place))
         if joint > 0:
             model.appendBodyToJoint(joint, _inertia(mj, body), place)
-        _add_frame(model, mj.body(body).name, joint, place)
-    for site in range(mj.nsite):
-        joint, place = attached[mj.site_bodyid[site]]
-        local = _placement(mj.site_quat[site], mj.site_pos[site])
-        _add_frame(model, mj.site(site).name, joint, place * local)
-    model.armature = np.array(mj.dof_armature)
+    for name, body, site in frames(mj):
+        joint, place = attached[body]
+        if site >= 0:
+            place = place * _placement(mj.site_quat[site], mj.site_pos[site])
+        if body > 0 or site >= 0:  # Pinocchio has a world of its own
+            model.addFrame(pin.Frame(name, joint, 0, place, pin.FrameType.OP_FRAME), False)
+    model.armature = _armature(mj)
     return model
 
 
@@ -104,9 +107,11 @@ def frame_ids(model: Any, description: Description) -> list[int]:
     return [known[name] for name in description.frame_names]
 
 
-def _add_joint(model: Any, mj: MjModel, j: int, parent: int, place: Any) -> tuple[int, Any]:
+def _add_joint(
+    model: Any, mj: MjModel, j: int, name: str, parent: int, place: Any
+) -> tuple[int, Any]:
     """Add MuJoCo's joint j; return the joint's id and the body's placement on it."""
-    kind, name = int(mj.jnt_type[j]), mj.joint(j).name or f"joint {j}"
+    kind = int(mj.jnt_type[j])
     anchor = pin.SE3(np.eye(3), np.array(mj.jnt_pos[j]))
     axis = np.array(mj.jnt_axis[j])
     reference = float(mj.qpos0[mj.jnt_qposadr[j]])
@@ -127,6 +132,16 @@ def _add_free_joint(model: Any, name: str) -> int:
     identity = pin.SE3.Identity()
     first = model.addJoint(0, pin.JointModelTranslation(), identity, f"{name}/translation")
     return model.addJoint(first, pin.JointModelSpherical(), identity, f"{name}/rotation")
+
+
+def _armature(mj: MjModel) -> np.ndarray:
+    """Return the inertia of motors at the joints, those of the joints and of actuators on them."""
+    armature = np.array(mj.dof_armature)
+    own = getattr(mj, "actuator_armature", np.zeros(0))  # since MuJoCo 4
+    for i in np.flatnonzero(own):
+        dof = int(mj.jnt_dofadr[mj.actuator_trnid[i, 0]])
+        armature[dof] += float(own[i]) * float(mj.actuator_gear[i, 0]) ** 2
+    return armature
 
 
 def _revolute(axis: np.ndarray) -> Any:
@@ -155,8 +170,3 @@ def _inertia(mj: MjModel, body: int) -> Any:
     rotation = _placement(mj.body_iquat[body], np.zeros(3)).rotation
     tensor = rotation @ np.diag(mj.body_inertia[body]) @ rotation.T
     return pin.Inertia(float(mj.body_mass[body]), np.array(mj.body_ipos[body]), tensor)
-
-
-def _add_frame(model: Any, name: str, joint: int, place: Any) -> None:
-    if name:
-        model.addFrame(pin.Frame(name, joint, 0, place, pin.FrameType.OP_FRAME), False)

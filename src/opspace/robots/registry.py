@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from pathlib import Path
+from warnings import warn
 
 import numpy as np
 
-from opspace.errors import missing_extra, unknown_name
+from opspace.errors import ModelWarning, missing_extra, unknown_name
 from opspace.robots.catalogue import CATALOGUE, SHIPPED, CatalogueEntry, locate
 from opspace.robots.description import Description
-from opspace.robots.loading import SUFFIXES, read_robot
+from opspace.robots.loading import SUFFIXES, RobotFile, read_robot
 from opspace.robots.protocol import Robot
 
 BACKENDS = ("pinocchio", "mujoco")
@@ -60,7 +61,8 @@ def load_robot(
         floating_base: Free the root link. Humanoids and quadrupeds loaded by name are always free.
 
     Returns:
-        The robot, updated at its reference posture at rest.
+        The robot, updated at its reference posture at rest. What its file says and the controller
+        does not follow is a `ModelWarning`, and stands in ``robot.description.warnings``.
 
     Raises:
         UnknownNameError: No robot or backend has this name.
@@ -71,14 +73,20 @@ def load_robot(
         raise unknown_name("backend", backend, BACKENDS)
     if isinstance(name_or_path, Path) or Path(name_or_path).suffix in SUFFIXES:
         file = read_robot(Path(name_or_path), backend, floating_base)
-        return file.build(file.description)
+        return _built(file, file.description)
     entry = _entry(name_or_path)
     path = locate(entry)
     if path is None:
         raise missing_extra(entry.package, "robots")
     free = floating_base or entry.floating_base
     file = read_robot(path, backend, free, entry.locked_joints)
-    return file.build(_named(file.description, name_or_path, entry))
+    return _built(file, _named(file.description, name_or_path, entry))
+
+
+def _built(file: RobotFile, description: Description) -> Robot:
+    for sentence in description.warnings:
+        warn(f"{description.name}: {sentence}", ModelWarning, stacklevel=3)
+    return file.build(description)
 
 
 def _entry(name: str) -> CatalogueEntry:

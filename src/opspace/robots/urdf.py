@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 import xml.etree.ElementTree as ET
-from collections.abc import Collection
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from opspace.errors import ModelError, unknown_name
-from opspace.robots.description import BASE_JOINT, WORLD, Description, mid_range
+from opspace.robots.description import BASE_JOINT, WORLD, Description, mid_range, unused
 
 VECTORS = {"xyz", "rpy"}
 MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
@@ -74,7 +74,10 @@ def read_urdf(path: Path, locked: Collection[str] = (), floating_base: bool = Fa
     """
     root = _parse(path)
     _check_numbers(root, path)
-    links = {_name(link, path): link.find("inertial") for link in root.findall("link")}
+    bodies = [_name(link, path) for link in root.findall("link")]
+    for repeated in (n for n in bodies if bodies.count(n) > 1):
+        raise ModelError(f"{path}: link {repeated!r} occurs twice")
+    links = dict(zip(bodies, (link.find("inertial") for link in root.findall("link")), strict=True))
     elements = [joint for joint in root.findall("joint") if joint.get("type") is not None]
     names = [_name(joint, path) for joint in elements]
     for repeated in (n for n in names if names.count(n) > 1):
@@ -108,7 +111,10 @@ def describe_urdf(urdf: Urdf, floating_base: bool) -> Description:
     q[base_q:] = mid_range(lower[base_v:], upper[base_v:])
     if floating_base:
         q[3] = 1.0
-    names = [f"{BASE_JOINT}/{i}" for i in range(base_v)] + [j.name for j in moving]
+    own = [j.name for j in moving]
+    names = [unused(f"{BASE_JOINT}/{i}", own) for i in range(base_v)] + own
+    units = ["m"] * (base_v // 2) + ["rad"] * (base_v // 2)
+    units += ["m" if j.kind == "prismatic" else "rad" for j in moving]
     frames = ([] if WORLD in urdf.links else [WORLD]) + list(urdf.links)
     return Description(
         name=urdf.name,
@@ -116,6 +122,7 @@ def describe_urdf(urdf: Urdf, floating_base: bool) -> Description:
         nq=len(q),
         nv=len(names),
         joint_names=tuple(names),
+        joint_units=tuple(units),
         frame_names=tuple(frames),
         tool=_tool(urdf),
         q_reference=q,
@@ -127,7 +134,15 @@ def describe_urdf(urdf: Urdf, floating_base: bool) -> Description:
         quaternions=(3,) if floating_base else (),
         floating_base=floating_base,
         locked_joints=urdf.locked,
+        warnings=tuple(_warnings(moving)),
     )
+
+
+def _warnings(joints: Iterable[UrdfJoint]) -> Iterator[str]:
+    """Say where a limit is there that limits nothing."""
+    stuck = [j.name for j in joints if j.kind != "continuous" and math.isinf(j.upper)]
+    if stuck:
+        yield f"the lower and the upper limit of {', '.join(stuck)} are both 0: taken as no limit"
 
 
 def _parse(path: Path) -> ET.Element:
@@ -186,6 +201,11 @@ def _joint(
     lower, upper = float(given.get("lower", 0.0)), float(given.get("upper", 0.0))
     if kind in ("revolute", "prismatic") and lower > upper:
         raise ModelError(f"{path}: lower limit of joint {name!r} is above its upper limit")
+    if kind in ("revolute", "prismatic") and lower == upper != 0.0 and name not in locked:
+        raise ModelError(
+            f"{path}: lower and upper limit of joint {name!r} are both {lower:g}: it cannot move; "
+            "make it a fixed joint, or give it a range"
+        )
     if kind == "continuous" or lower == upper:
         lower, upper = -math.inf, math.inf
     return UrdfJoint(
@@ -195,12 +215,23 @@ def _joint(
         child=ends["child"],
         lower=lower,
         upper=upper,
-        # Zero is how files say that nothing is known.
-        velocity=float(given.get("velocity", 0.0)) or math.inf,
-        effort=float(given.get("effort", 0.0)) or math.inf,
+        velocity=_largest(given, "velocity", name, path),
+        effort=_largest(given, "effort", name, path),
         axis=_axis(element, path),
         element=element,
     )
+
+
+def _largest(limit: Mapping[str, str], key: str, joint: str, path: Path) -> float:
+    """Return a limit of both directions; 0 and −1 are how files say that there is none."""
+    value = float(limit.get(key, 0.0))
+    if value in (0.0, -1.0):
+        return math.inf
+    if value < 0.0:
+        raise ModelError(
+            f"{path}: {key}={value:g} of joint {joint!r} is below zero; 0 or -1 is no limit"
+        )
+    return value
 
 
 def _axis(element: ET.Element, path: Path) -> tuple[float, ...]:
