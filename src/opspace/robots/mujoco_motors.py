@@ -48,7 +48,7 @@ class Span(NamedTuple):
 NOTHING, ANYTHING = Span(0.0, 0.0), Span(-math.inf, math.inf)
 
 
-class Motors(NamedTuple):
+class Actuation(NamedTuple):
     """What drives the joints.
 
     Attributes:
@@ -69,7 +69,7 @@ class Motors(NamedTuple):
         return np.array([max(0.0, min(-span.least, span.most)) for span in self.spans])
 
 
-def read_motors(model: mujoco.MjModel, joints: Sequence[str]) -> Motors:
+def read_motors(model: mujoco.MjModel, joints: Sequence[str]) -> Actuation:
     """Read the actuators: control and force ranges, gears, tendons, and the ranges of joints.
 
     Args:
@@ -108,7 +108,7 @@ def read_motors(model: mujoco.MjModel, joints: Sequence[str]) -> Motors:
         dof = int(model.jnt_dofadr[j])
         spans[dof] = spans[dof].clipped(*model.jnt_actfrcrange[j])
     servos = tuple(_name(model, i) for i in working if not _obeys(model, i))
-    return Motors(tuple(spans), servos, tuple(unread), shared)
+    return Actuation(tuple(spans), servos, tuple(unread), shared)
 
 
 def force_span(model: mujoco.MjModel, i: int) -> Span:
@@ -136,7 +136,7 @@ def levers(model: mujoco.MjModel, tendon: int) -> dict[int, float]:
     return arms
 
 
-def motor_warnings(motors: Motors, joints: Sequence[str], units: Sequence[str]) -> Iterator[str]:
+def motor_warnings(motors: Actuation, joints: Sequence[str], units: Sequence[str]) -> Iterator[str]:
     """Say what a torque limit cannot say.
 
     Args:
