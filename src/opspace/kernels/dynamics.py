@@ -21,7 +21,8 @@ def evaluate(bodies, q, v, dynamics):
 
         M = Σᵢ Jᵢᵀ Iᵢ Jᵢ + armature      b + g = Σᵢ Jᵢᵀ (Iᵢ (J̇ᵢ v − g) + Vᵢ ×* Iᵢ Vᵢ),  Vᵢ = Jᵢ v
 
-    by the composite-rigid-body and the recursive Newton-Euler algorithm.
+    by the composite-rigid-body and the recursive Newton-Euler algorithm. Springs at the joints and
+    weight that is carried for the robot count as parts of g.
 
     Args:
         bodies: `RIGID_BODIES`.
@@ -56,9 +57,14 @@ def evaluate(bodies, q, v, dynamics):
         _push(
             dynamics.inertia[i], dynamics.velocity[i], dynamics.acceleration[i], dynamics.force[i]
         )
+        if bodies.carried[i] != 0.0:
+            _carry(x, bodies.carried[i], bodies.carried_at[i], bodies.gravity, dynamics.force[i])
     for i in range(bodies.kind.shape[0] - 1, 0, -1):
         for a in range(bodies.first_v[i], bodies.first_v[i] + bodies.width[i]):
             dynamics.bias[a] = _dot(dynamics.axes[a], dynamics.force[i])
+            if bodies.stiffness[a] != 0.0:
+                stretched = q[bodies.first_q[i] + a - bodies.first_v[i]] - bodies.relaxed[a]
+                dynamics.bias[a] += bodies.stiffness[a] * stretched
             _row(a, dynamics.inertia[i], dynamics.axes, bodies.before, dynamics.M)
             dynamics.M[a, a] += bodies.armature[a]
         p = bodies.parent[i]
@@ -241,6 +247,20 @@ def _push(Y, V, A, f):
     f[3] = n0 + w1 * l2 - w2 * l1 + v1 * p2 - v2 * p1
     f[4] = n1 + w2 * l0 - w0 * l2 + v2 * p0 - v0 * p2
     f[5] = n2 + w0 * l1 - w1 * l0 + v0 * p1 - v1 * p0
+
+
+@jit
+def _carry(x, m, at, g, f):
+    """Take the weight of a mass m [kg] at its centre on the body off the force f (6,), N and N·m."""
+    c0, c1, c2 = _rotated(x, at)
+    c0, c1, c2 = c0 + x[9], c1 + x[10], c2 + x[11]
+    w0, w1, w2 = m * g[0], m * g[1], m * g[2]
+    f[0] += w0
+    f[1] += w1
+    f[2] += w2
+    f[3] += c1 * w2 - c2 * w1
+    f[4] += c2 * w0 - c0 * w2
+    f[5] += c0 * w1 - c1 * w0
 
 
 @jit

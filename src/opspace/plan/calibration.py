@@ -59,7 +59,7 @@ class Workspace:
             robot.update(q, np.zeros(robot.nv))
             inverse = np.linalg.inv(_checked_inertia(robot))
             joint_sigma = min(joint_sigma, float(np.linalg.eigvalsh(inverse)[0]))
-            spare = np.maximum(robot.torque_limit - np.abs(robot.gravity), 0.0)
+            spare = np.maximum(robot.torque_limit - np.abs(robot.bias), 0.0)  # at rest
             brake = np.minimum(brake, 0.5 * spare * np.diag(inverse))
             self._visited.append((q, inverse))
         self.brake = np.where(np.isfinite(brake), np.clip(brake, *BRAKE_RANGE), UNKNOWN_BRAKE)

@@ -91,11 +91,11 @@ class AdapterBase(ABC):
     @property
     @abstractmethod
     def bias(self) -> np.ndarray:
-        """Return b + g, (nv,) N·m. Friction is not part of it."""
+        """Return b + g, (nv,) N·m, springs included. Friction is not part of it."""
 
     @property
     def gravity(self) -> np.ndarray:
-        """Return the gravity torque g, (nv,) N·m."""
+        """Return the gravity torque g, (nv,) N·m, without weight that is carried for the robot."""
         return self._cached("gravity", 0, self._gravity)
 
     def update(self, q: np.ndarray, v: np.ndarray) -> None:

@@ -31,13 +31,17 @@ RIGID_BODIES = RecordTable(
     _fixed("before", ("n",), "coordinate before each one, −1 for none", dtype=_INT),
     _fixed("armature", ("n",), "inertia of the motors at the joints", "kg·m², kg"),
     _fixed("gravity", (3,), "gravity", "m/s²"),
+    _fixed("carried", ("bodies",), "mass whose weight is carried for the robot", "kg"),
+    _fixed("carried_at", ("bodies", 3), "its centre on the body", "m"),
+    _fixed("stiffness", ("n",), "of the springs at the joints", "N·m/rad, N/m"),
+    _fixed("relaxed", ("n",), "where they pull nowhere", "rad, m"),
 )
 
 DYNAMICS = RecordTable(
     "Dynamics",
     "What `opspace.kernels.dynamics.evaluate` finds at one state, and the memory that it works in.",
     _found("M", ("n", "n"), "joint-space inertia, armature included", "kg·m²"),
-    _found("bias", ("n",), "b + g", "N·m"),
+    _found("bias", ("n",), "b + g, springs included", "N·m"),
     _found("axes", ("n", 6), "motion that one unit of each velocity coordinate gives to a body"),
     _found("placement", ("bodies", 12), "rotation by columns, then position", "m"),
     Field("velocity", ("bodies", 6), "motion of each body", "m/s, rad/s"),

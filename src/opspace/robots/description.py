@@ -13,6 +13,27 @@ BASE_JOINT = "floating_base"
 
 
 @dataclass(frozen=True)
+class Springs:
+    """Linear springs at joints.
+
+    Attributes:
+        coordinates: (k,) their velocity coordinates.
+        entries: (k,) the entries of q that they stretch with.
+        stiffness: (k,) N·m/rad or N/m.
+        relaxed: (k,) where they pull nowhere, rad or m.
+    """
+
+    coordinates: np.ndarray
+    entries: np.ndarray
+    stiffness: np.ndarray
+    relaxed: np.ndarray
+
+    def add_to(self, bias: np.ndarray, q: np.ndarray) -> None:
+        """Add the torque that holds them at q (nq,) to a bias (nv,), N·m or N."""
+        bias[self.coordinates] += self.stiffness * (q[self.entries] - self.relaxed)
+
+
+@dataclass(frozen=True)
 class Description:
     """Names, limits and postures of a robot, independent of the library that computes it.
 
@@ -21,6 +42,7 @@ class Description:
     Attributes:
         quaternions: Index in q of the first coordinate (w) of every quaternion.
         joint_units: (nv,) unit of each coordinate's position, "rad" or "m".
+        springs: What pulls at the joints besides, None for nothing.
         warnings: What the file says and the controller does not follow, a sentence each.
     """
 
@@ -42,6 +64,7 @@ class Description:
     floating_base: bool = False
     locked_joints: tuple[str, ...] = ()
     configurations: Mapping[str, np.ndarray] = field(default_factory=dict)
+    springs: Springs | None = None
     warnings: tuple[str, ...] = ()
 
 

@@ -92,10 +92,10 @@ def _read_mjcf(
     description = describe_mujoco(compiled, path)
     if backend == "pinocchio":
         from opspace.robots.pinocchio import PinocchioRobot
-        from opspace.robots.pinocchio_model import model_from_mujoco
+        from opspace.robots.pinocchio_model import carried_from_mujoco, model_from_mujoco
 
-        model = model_from_mujoco(compiled)
-        return RobotFile(description, lambda d: PinocchioRobot(d, model))
+        model, carried = model_from_mujoco(compiled), carried_from_mujoco(compiled)
+        return RobotFile(description, lambda d: PinocchioRobot(d, model, carried))
     from opspace.robots.mujoco import MujocoRobot
 
     return RobotFile(description, lambda d: MujocoRobot(d, compiled))

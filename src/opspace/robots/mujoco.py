@@ -12,7 +12,8 @@ from opspace.robots.adapter import AdapterBase
 from opspace.robots.description import Description
 from opspace.robots.motion_axes import FramePlace, MassPoint, MotionAxes
 from opspace.robots.mujoco_names import frames
-from opspace.robots.pinocchio_model import frame_ids, model_from_mujoco
+from opspace.robots.passive_forces import carries_weight
+from opspace.robots.pinocchio_model import carried_from_mujoco, frame_ids, model_from_mujoco
 from opspace.robots.rigid_model import RigidModel, rigid_model
 from opspace.robots.world_axes import placements, world_axes
 
@@ -37,6 +38,7 @@ class MujocoRobot(AdapterBase):
         self._massive = np.flatnonzero(moving & (model.body_mass > 0.0)).tolist()
         self._mass = model.body_mass * moving
         self._total_mass = float(self._mass.sum())
+        self._carries = carries_weight(model)
         self._M = np.zeros((self.nv, self.nv))
         self._bias = np.zeros(self.nv)
         self._M_view, self._bias_view = self._M.view(), self._bias.view()
@@ -105,7 +107,10 @@ class MujocoRobot(AdapterBase):
     def rigid_model(self) -> RigidModel | None:
         """Return the bodies as numbers; they are those of the same model in Pinocchio."""
         model = model_from_mujoco(self._model)
-        return rigid_model(model, frame_ids(model, self.description))
+        carried = carried_from_mujoco(self._model)
+        return rigid_model(
+            model, frame_ids(model, self.description), carried, self.description.springs
+        )
 
     def _last_dof(self, body: int) -> int:
         """Return the last joint coordinate that moves a body, −1 for none."""
@@ -137,6 +142,10 @@ class MujocoRobot(AdapterBase):
         mujoco.mj_fullM(model, data, self._M)
         mujoco.mj_comVel(model, data)
         mujoco.mj_rne(model, data, 0, self._bias)
+        if self._carries:
+            self._bias -= self._weight_carried()
+        if self.description.springs is not None:
+            self.description.springs.add_to(self._bias, self._q)
         self._fill_axes()
 
     def _fill_axes(self) -> None:
@@ -147,7 +156,17 @@ class MujocoRobot(AdapterBase):
 
     def _gravity(self, _: int) -> np.ndarray:
         # g(q) = -sum_i m_i J_i^T g, which is the whole mass at the centre of mass.
-        return -self._total_mass * (self.com_jacobian().T @ self._model.opt.gravity)
+        g = -self._total_mass * (self.com_jacobian().T @ self._model.opt.gravity)
+        return g - self._weight_carried() if self._carries else g
+
+    def _weight_carried(self) -> np.ndarray:
+        model, data = self._model, self._data
+        carried = np.zeros(self.nv)
+        for body in np.flatnonzero(model.body_gravcomp):
+            lift = -model.body_gravcomp[body] * model.body_mass[body] * model.opt.gravity
+            point = data.xipos[body]
+            mujoco.mj_applyFT(model, data, lift, np.zeros(3), point, int(body), carried)
+        return carried
 
     def _position(self, frame: int) -> np.ndarray:
         site = self._sites[frame]

@@ -26,6 +26,7 @@ from opspace.robots.mujoco_names import (
     shared_names,
 )
 from opspace.robots.mujoco_scene import add_scenery, add_skeleton
+from opspace.robots.passive_forces import force_warnings, read_springs
 from opspace.robots.urdf import Urdf, read_urdf
 from opspace.robots.urdf_export import inertia, to_xml
 
@@ -62,7 +63,10 @@ def mujoco_model(
     else:
         spec = mjcf_spec(path, floating_base, locked_joints)
     add_scenery(spec)
-    return compile_spec(spec, path)
+    model = compile_spec(spec, path)
+    # Where actuators carry weight, MuJoCo counts it to them; the plant drives joints without any.
+    model.jnt_actgravcomp[:] = 0
+    return model
 
 
 def mjcf_spec(
@@ -150,6 +154,8 @@ def compile_spec(spec: mujoco.MjSpec, path: Path) -> mujoco.MjModel:
     armature = np.flatnonzero(getattr(model, "actuator_armature", ()))  # since MuJoCo 4
     if not np.isin(model.actuator_trntype[armature], ON_JOINT).all():
         raise ModelError(f"{path}: armature of actuators that are not on a joint is not supported")
+    if model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_GRAVITY:
+        model.opt.gravity[:] = 0.0
     return model
 
 
@@ -189,7 +195,12 @@ def describe_mujoco(model: mujoco.MjModel, path: Path) -> Description:
         quaternions=_quaternions(model),
         floating_base=bool(free.any()),
         configurations=keys,
-        warnings=(*_shared(model), *motor_warnings(motors, names, efforts)),
+        springs=read_springs(model),
+        warnings=(
+            *_shared(model),
+            *motor_warnings(motors, names, efforts),
+            *force_warnings(model, motors.limit),
+        ),
     )
 
 

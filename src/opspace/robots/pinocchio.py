@@ -26,15 +26,17 @@ composite_inertia = pin.crba
 class PinocchioRobot(AdapterBase):
     """A robot whose dynamics Pinocchio computes."""
 
-    def __init__(self, description: Description, model: Any) -> None:
+    def __init__(self, description: Description, model: Any, carried: Any = None) -> None:
         """Wrap a model.
 
         Args:
             description: Names, limits and postures, in the model's order.
             model: The ``pinocchio.Model``; it is never changed.
+            carried: Another one, of the masses whose weight is carried for the robot.
         """
         super().__init__(description)
-        self._model = model
+        self._model, self._carried = model, carried
+        self._carried_data = None if carried is None else carried.createData()
         self._data = model.createData()
         # Gravity and centre of mass overwrite intermediate results that the frames still need.
         self._scratch = model.createData()
@@ -47,6 +49,7 @@ class PinocchioRobot(AdapterBase):
         self._M.setflags(write=False)
         self._bias = self._data.nle
         self._bias.setflags(write=False)
+        self._writable_bias = self._data.nle
         self._accelerations_known = False
         self._placement = _contiguous_placements(self._data)
         self.update(self.q_reference, self._zero)
@@ -65,7 +68,7 @@ class PinocchioRobot(AdapterBase):
 
     def fresh(self) -> PinocchioRobot:
         """Return the same robot with a state of its own; the model is shared."""
-        return PinocchioRobot(self.description, self._model)
+        return PinocchioRobot(self.description, self._model, self._carried)
 
     def motion_axes(self) -> MotionAxes | None:
         """Return the arrays that compiled code reads, or None if a joint has several coordinates."""
@@ -87,7 +90,7 @@ class PinocchioRobot(AdapterBase):
 
     def rigid_model(self) -> RigidModel | None:
         """Return the bodies as numbers, or None if there is a joint that they cannot describe."""
-        return rigid_model(self._model, self._frames)
+        return rigid_model(self._model, self._frames, self._carried, self.description.springs)
 
     def integrate(self, q: np.ndarray, v: np.ndarray, dt: float) -> np.ndarray:
         """Return q ⊕ v dt on the configuration manifold, (nq,)."""
@@ -111,9 +114,17 @@ class PinocchioRobot(AdapterBase):
         nonlinear_effects(model, data, q, self._v)
         # The world convention leaves the joint Jacobians in the data, which the frames read.
         composite_inertia(model, data, q, WORLD_CONVENTION)
+        if self._carried is not None:
+            self._writable_bias -= self._weight_carried()
+        if self.description.springs is not None:
+            self.description.springs.add_to(self._writable_bias, self._q)
+
+    def _weight_carried(self) -> np.ndarray:
+        return pin.computeGeneralizedGravity(self._carried, self._carried_data, self._q_pin)
 
     def _gravity(self, _: int) -> np.ndarray:
-        return np.array(pin.computeGeneralizedGravity(self._model, self._scratch, self._q_pin))
+        g = np.array(pin.computeGeneralizedGravity(self._model, self._scratch, self._q_pin))
+        return g if self._carried is None else g - self._weight_carried()
 
     def _position(self, frame: int) -> np.ndarray:
         placement = pin.updateFramePlacement(self._model, self._data, self._frames[frame])

@@ -55,7 +55,17 @@ def model_from_urdf(urdf: Urdf, floating_base: bool) -> Any:
     return pin.appendModel(base, fixed, frame, pin.SE3.Identity())
 
 
-def model_from_mujoco(mj: MjModel) -> Any:
+def carried_from_mujoco(mj: MjModel) -> Any | None:
+    """Build the model of the masses whose weight MuJoCo carries itself (gravcomp), None for none.
+
+    Its gravity torque is what is to be taken off that of `model_from_mujoco`.
+    """
+    if not np.any(mj.body_gravcomp):
+        return None
+    return model_from_mujoco(mj, mj.body_gravcomp * mj.body_mass)
+
+
+def model_from_mujoco(mj: MjModel, masses: np.ndarray | None = None) -> Any:
     """Build the model that MuJoCo's compiler made of an MJCF file.
 
     The compiler resolves defaults, includes, frames and inertias; reading its result leaves no room
@@ -63,6 +73,7 @@ def model_from_mujoco(mj: MjModel) -> Any:
 
     Args:
         mj: The compiled model.
+        masses: (bodies,) points of mass in place of the bodies, kg; None takes the bodies.
 
     Returns:
         The ``pinocchio.Model``; joints have as many coordinates and the same order as in MuJoCo.
@@ -80,7 +91,8 @@ def model_from_mujoco(mj: MjModel) -> Any:
             joint, place = _add_joint(model, mj, j, joints[j], joint, place)
         attached.append((joint, place))
         if joint > 0:
-            model.appendBodyToJoint(joint, _inertia(mj, body), place)
+            point = None if masses is None else float(masses[body])
+            model.appendBodyToJoint(joint, _inertia(mj, body, point), place)
     for name, body, site in frames(mj):
         joint, place = attached[body]
         if site >= 0:
@@ -166,7 +178,9 @@ def _placement(quat: np.ndarray, position: np.ndarray) -> Any:
     return pin.SE3(rotation, np.array(position))
 
 
-def _inertia(mj: MjModel, body: int) -> Any:
+def _inertia(mj: MjModel, body: int, point: float | None) -> Any:
+    if point is not None:
+        return pin.Inertia(point, np.array(mj.body_ipos[body]), np.zeros((3, 3)))
     rotation = _placement(mj.body_iquat[body], np.zeros(3)).rotation
     tensor = rotation @ np.diag(mj.body_inertia[body]) @ rotation.T
     return pin.Inertia(float(mj.body_mass[body]), np.array(mj.body_ipos[body]), tensor)

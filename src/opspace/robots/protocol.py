@@ -73,7 +73,7 @@ class Robot(Protocol):
 
     @property
     def bias(self) -> np.ndarray:
-        """Return the Coriolis, centrifugal and gravity torque b + g, (nv,) N·m."""
+        """Return the Coriolis, centrifugal and gravity torque b + g, (nv,) N·m, springs included."""
         ...
 
     @property

@@ -14,6 +14,7 @@ import pinocchio as pin
 
 from opspace.machine.field_table import Record
 from opspace.robots.bodies import RIGID_BODIES
+from opspace.robots.description import Springs
 from opspace.robots.joint_kinds import ALIGNED, BALL, HINGE, SLIDE, TRANSLATION
 from opspace.robots.motion_axes import FramePlace, MassPoint, MotionAxes
 
@@ -55,12 +56,16 @@ class RigidModel:
         )
 
 
-def rigid_model(model: Any, frames: Sequence[int]) -> RigidModel | None:
+def rigid_model(
+    model: Any, frames: Sequence[int], carried: Any = None, springs: Springs | None = None
+) -> RigidModel | None:
     """Read the bodies of a model.
 
     Args:
         model: The ``pinocchio.Model``.
         frames: The model's index of each frame of the robot.
+        carried: The ``pinocchio.Model`` of the masses whose weight is carried; None for none.
+        springs: Springs at the joints.
 
     Returns:
         The bodies, or None if there is a joint other than hinges, slides, ball joints and
@@ -73,6 +78,11 @@ def rigid_model(model: Any, frames: Sequence[int]) -> RigidModel | None:
     integers = np.int64
     places = [_numbers(placement) for placement in model.jointPlacements]
     inertias = [_WORLD_INERTIA, *list(model.inertias)[1:]]
+    weights = inertias if carried is None else [_WORLD_INERTIA, *list(carried.inertias)[1:]]
+    stiffness, relaxed = np.zeros(model.nv), np.zeros(model.nv)
+    if springs is not None:
+        stiffness[springs.coordinates] = springs.stiffness
+        relaxed[springs.coordinates] = springs.relaxed
     last = np.array([-1, *(j.first_v + j.width - 1 for j in known[1:])], integers)
     fields = {
         "kind": np.array([j.kind for j in known], integers),
@@ -89,6 +99,10 @@ def rigid_model(model: Any, frames: Sequence[int]) -> RigidModel | None:
         "before": _before(model, known, last),
         "armature": np.array(model.armature, float),
         "gravity": np.array(model.gravity.linear, float),
+        "carried": np.array([0.0 if carried is None else float(w.mass) for w in weights]),
+        "carried_at": np.array([w.lever for w in weights], float).reshape(-1, 3),
+        "stiffness": stiffness,
+        "relaxed": relaxed,
     }
     return RigidModel(
         RIGID_BODIES.make({}, fields), frame_places(model, frames, last), mass_points(model, last)
