@@ -102,6 +102,14 @@ class Batch:
                 list(pool.map(work, used))
         return tau
 
+    def gravity(self, Q: np.ndarray, V: np.ndarray) -> np.ndarray:
+        """Compute the gravity torque at every state, (states, n) N·m."""
+        robot, found = self.robot.fresh(), np.zeros(V.shape)
+        for row, q, v in zip(found, Q, V, strict=True):
+            robot.update(q, v)
+            row[:] = np.nan_to_num(robot.gravity, nan=0.0, posinf=0.0, neginf=0.0)
+        return found
+
     def _own_activations(self, Q: np.ndarray, V: np.ndarray, t: float) -> np.ndarray:
         """Evaluate the activations that users gave to tasks, in Python, state by state."""
         own = np.ones((1, len(self.members)))

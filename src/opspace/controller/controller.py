@@ -129,7 +129,7 @@ class Controller(ReferenceController):
         command = NEW(
             Command, (t, torque(), status, answer // SOLVE, CompiledReport(plan, memory()))
         )
-        return command if self._handover is None else self._handed_over(command)
+        return command if self._plain else self._for_robot(command)
 
     def _learn(self, t: float, observer: DisturbanceObserver) -> int:
         """Tick with joint limits that learn what the model does not explain."""
@@ -169,8 +169,9 @@ class Controller(ReferenceController):
             threads: Number of threads; None is one for each core that the process may use.
 
         Returns:
-            (states, n) torques, N·m, bias included; always finite. In a state where the model
-            gives nothing usable it is the braking torque that `step` gives with ``Status.FAULT``.
+            (states, n) torques, N·m, bias included as far as `step` includes it; always finite. In a
+            state where the model gives nothing usable it is the braking torque that `step` gives with
+            ``Status.FAULT``.
 
         Raises:
             InputError: A wrong shape or a number that is not finite, with its row; a task that is
@@ -191,7 +192,9 @@ class Controller(ReferenceController):
             batch = self._batch = self._batched(members, threads)
         if self._observer is not None:
             batch.disturb(self._observer.acceleration)
-        return batch.torque(*checked_states(batch.robot, Q, V), float(t), self._plan)
+        states = checked_states(batch.robot, Q, V)
+        tau = batch.torque(*states, float(t), self._plan)
+        return tau - batch.gravity(*states) if self._robot_adds else tau
 
     def warm_up(self) -> float:
         """Compile the tick, or read what was compiled before; the first tick does it otherwise.

@@ -43,13 +43,14 @@ class Handover:
         self._profile = Profile("quintic")
         self.done = False
 
-    def torque(self, t: float, tau: np.ndarray, limit: np.ndarray) -> np.ndarray:
+    def torque(self, t: float, tau: np.ndarray, limit: np.ndarray, added: np.ndarray) -> np.ndarray:
         """Mix the controller's torque with the other one.
 
         Args:
             t: Time, s.
             tau: (n,) torque of the controller, N·m.
             limit: (n,) what the motors give, N·m; what is mixed stays inside where both are.
+            added: (n,) what the robot adds to either, N·m, and the motors give as well.
 
         Returns:
             (n,) torque for the robot, N·m.
@@ -61,5 +62,6 @@ class Handover:
         if self.back:
             return tau + s * (self._tau - tau)
         self.done = s >= 1.0
-        inside = np.maximum(limit, np.maximum(np.abs(tau), np.abs(self._tau)))
-        return np.clip(tau + (1.0 - s) * self._offset, -inside, inside)
+        inside = np.maximum(limit, np.maximum(np.abs(tau + added), np.abs(self._tau + added)))
+        mixed = tau + (1.0 - s) * self._offset + added
+        return np.clip(mixed, -inside, inside) - added

@@ -26,6 +26,11 @@ BIASES = ("joint", "task")
 """``joint``: Γ = Γ_tasks + b + g, every joint compensated. ``task``: Eq. 3 as printed, the bias is
 compensated only inside the range of the tasks and fades with them."""
 
+GRAVITIES = ("controller", "robot")
+"""``controller``: the command holds the robot's weight. ``robot``: the robot adds the torque for that to
+every command itself, as the drivers of Franka, KUKA and UR do, and the command leaves it out; limits
+count what both give together."""
+
 TORQUE_LIMITS = ("report", "priority")
 """``report``: a torque above the motors' limits is reported and left as it is. ``priority``: levels give
 way until it is inside, the lowest first."""
@@ -46,6 +51,8 @@ class ReferenceController:
             `opspace.stack.Blending` of one's own. Joint limits, of which many may act at
             once, are always blended by the chain.
         bias: ``"joint"`` (default) or ``"task"``, see `BIASES`.
+        gravity: Who adds the torque that holds the weight, ``"controller"`` (default) or ``"robot"``,
+            see `GRAVITIES`.
         singularity: Buffer for singular directions; None switches their handling off.
         damping: Joint damping in the motions that no task uses, 1/s; also what a joint is braked
             with in case of a fault. Unused where a posture task covers every joint.
@@ -69,6 +76,7 @@ class ReferenceController:
         *,
         blending: str | Blending = "auto",
         bias: str = "joint",
+        gravity: str = "controller",
         singularity: Singularity | None = DEFAULT_SINGULARITY,
         damping: float = 10.0,
         torque_limits: str = "report",
@@ -79,6 +87,8 @@ class ReferenceController:
         self._blending = blending if isinstance(blending, Blending) else Blending(blending)
         if bias not in BIASES:
             raise unknown_name("bias", bias, BIASES)
+        if gravity not in GRAVITIES:
+            raise unknown_name("gravity", gravity, GRAVITIES)
         if torque_limits not in TORQUE_LIMITS:
             raise unknown_name("torque_limits", torque_limits, TORQUE_LIMITS)
         if not (math.isfinite(damping) and damping >= 0.0):
@@ -96,6 +106,8 @@ class ReferenceController:
             Profile(stack.limits.profile)
         self._robot, self._stack = robot, stack
         self.bias = bias
+        self.gravity = gravity
+        self._robot_adds = gravity == "robot"
         self.singularity = singularity
         self.damping = float(damping)
         self.torque_limits = torque_limits
@@ -108,6 +120,7 @@ class ReferenceController:
         if stack.limits is not None:
             stack.limits.bind(robot, self.calibration.brake)
         self._handover: Handover | None = None
+        self._plain = not self._robot_adds  # what is computed is what is commanded
         self._observer = _observer(stack.limits, robot.nv, torque_limits)
         self._rules = Rules(
             law,
@@ -124,7 +137,8 @@ class ReferenceController:
         handled = "off" if self.singularity is None else repr(self.singularity)
         return (
             f"{type(self).__name__} of {self._robot!r}\n"
-            f"  bias={self.bias!r}, torque_limits={self.torque_limits!r}, singularity={handled}\n"
+            f"  bias={self.bias!r}, gravity={self.gravity!r}, torque_limits={self.torque_limits!r}, "
+            f"singularity={handled}\n"
             f"{self._stack!r}"
         )
 
@@ -135,26 +149,29 @@ class ReferenceController:
         after `hand_back`, it begins anew.
 
         Args:
-            tau: (n,) torque that is on the robot now, N·m.
+            tau: (n,) torque that is on the robot now, N·m; without gravity where the robot adds it.
             duration: How long it takes, s.
 
         Raises:
             InputError: A torque of another size or not finite, or a duration that is none.
         """
-        self._handover = Handover(self._joint_torque(tau), duration, back=False)
+        self._begin(Handover(self._joint_torque(tau), duration, back=False))
 
     def hand_back(self, tau: ArrayLike, duration: float = 0.5) -> None:
         """Move from the controller's torque to the one that takes over, and stay there.
 
         Args:
-            tau: (n,) torque to end at, N·m: what the next controller begins with, or ``robot.gravity``
-                where brakes are about to close.
+            tau: (n,) torque to end at, N·m: what the next controller begins with, or where brakes are
+                about to close ``robot.gravity``, or zero where the robot adds it.
             duration: How long it takes, s.
 
         Raises:
             InputError: A torque of another size or not finite, or a duration that is none.
         """
-        self._handover = Handover(self._joint_torque(tau), duration, back=True)
+        self._begin(Handover(self._joint_torque(tau), duration, back=True))
+
+    def _begin(self, handover: Handover) -> None:
+        self._handover, self._plain = handover, False
 
     def _joint_torque(self, tau: ArrayLike) -> np.ndarray:
         found = numbers(tau, "the torque")
@@ -164,16 +181,23 @@ class ReferenceController:
             )
         return found
 
-    def _handed_over(self, command: Command) -> Command:
-        """Mix the torque with another controller's while it takes over or hands back."""
-        handover = self._handover
-        assert handover is not None
+    def _for_robot(self, command: Command) -> Command:
+        """Leave out what the robot adds, and mix in another controller's torque in a handover."""
+        added, handover = self._added_by_robot(), self._handover
+        if handover is None:
+            return command._replace(tau=command.tau - added)
         if self._observer is not None:
             self._observer.forget_last()
-        tau = handover.torque(command.t, command.tau, self.robot.torque_limit)
+        tau = handover.torque(command.t, command.tau - added, self.robot.torque_limit, added)
         if handover.done:
-            self._handover = None
+            self._handover, self._plain = None, not self._robot_adds
         return command._replace(tau=tau, status=command.status | Status.HANDOVER)
+
+    def _added_by_robot(self) -> np.ndarray:
+        """Torque that the robot adds to a command, (n,) N·m, finite whatever the model says."""
+        if not self._robot_adds:
+            return np.zeros(self.robot.nv)
+        return np.nan_to_num(self.robot.gravity, nan=0.0, posinf=0.0, neginf=0.0)
 
     @property
     def robot(self) -> Robot:
@@ -224,7 +248,7 @@ class ReferenceController:
         if Status.FAULT in status:
             tau = self._braking()
         command = Command(t, tau, status | timing, hard_solves, found)
-        return command if self._handover is None else self._handed_over(command)
+        return command if self._plain else self._for_robot(command)
 
     @property
     def _holds(self) -> bool:
@@ -234,7 +258,8 @@ class ReferenceController:
         """Brake in a tick that cannot be trusted."""
         if self._observer is not None:
             self._observer.forget_last()
-        return Command(t, self._braking(), status, 0, Found({}, (), {}))
+        tau = self._braking() - self._added_by_robot()
+        return Command(t, tau, status, 0, Found({}, (), {}))
 
     def _braking(self) -> np.ndarray:
         """Bias with joint damping, inside the motors' limits; finite whatever the model says."""

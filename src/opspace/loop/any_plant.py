@@ -10,6 +10,10 @@ import numpy as np
 class AnyPlant(Protocol):
     """A robot that is read, and driven by joint torque.
 
+    One that adds the torque against its own weight to every command says so by an attribute
+    ``adds_gravity = True``, and one that does not by False; a controller that was built for the other
+    kind is then refused.
+
     Attributes:
         dt: Time between two ticks, s.
     """

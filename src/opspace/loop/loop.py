@@ -79,6 +79,26 @@ class Outcome:
     reason: str
 
 
+def check_gravity(plant: object, controller: object) -> None:
+    """Check that exactly one of the two adds the torque against gravity, as far as both say.
+
+    Args:
+        plant: The robot.
+        controller: What commands it.
+
+    Raises:
+        InputError: Both add it, or none.
+    """
+    adds, left_to = getattr(plant, "adds_gravity", None), getattr(controller, "gravity", None)
+    if adds is None or left_to is None or adds == (left_to == "robot"):
+        return
+    whose, wanted = ("adds", "robot") if adds else ("does not add", "controller")
+    raise InputError(
+        f"the {type(plant).__name__} {whose} the torque against gravity itself; the controller must "
+        f"be built with gravity={wanted!r}, not {left_to!r}"
+    )
+
+
 def simulate(
     plant: AnyPlant,
     controller: Stepping,
@@ -101,10 +121,11 @@ def simulate(
         How the run ended.
 
     Raises:
-        InputError: The duration is not a time.
+        InputError: The duration is not a time, or gravity would be added twice or by nobody.
     """
     if not (math.isfinite(duration) and duration >= 0.0):
         raise InputError(f"the duration must be finite and >= 0 s, got {duration}")
+    check_gravity(plant, controller)
     start = plant.t
     t = start
     for tick in range(round(duration / plant.dt)):

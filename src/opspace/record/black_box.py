@@ -82,6 +82,7 @@ class BlackBox:
         except OSError as error:
             raise RecordingError(f"{directory}: cannot be written: {error.strerror}") from error
         self._robot, self._tick = controller.robot, controller.step
+        self._gravity = controller.gravity
         self._header = dict(header or {})
         self._on = int(on)
         self._ticks = ticks
@@ -99,6 +100,11 @@ class BlackBox:
     def robot(self) -> Robot:
         """The controller's robot."""
         return self._robot
+
+    @property
+    def gravity(self) -> str:
+        """Who adds the torque that holds the weight, see `opspace.Controller`."""
+        return self._gravity
 
     def step(self, t: float, q: ArrayLike, v: ArrayLike) -> Command:
         """Compute the torque for one state; see `opspace.Controller.step`."""

@@ -52,6 +52,7 @@ def _robot(controller: ReferenceController) -> dict[str, Any]:
         "floating_base": robot.floating_base,
         "locked_joints": list(robot.locked_joints),
         "tool": robot.tool,
+        "gravity": controller.gravity,
         "joints": list(robot.joint_names),
         "units": list(joint_units(robot)),
         "lower": _finite(lower),

@@ -32,6 +32,8 @@ class Plant:
         dt: Time step, s.
         friction: Simulate the joint friction that the model has; the controller does not know it.
         torque_limits: Saturate the torque at the robot's limits.
+        adds_gravity: Add the torque that holds the weight to every command, as robots do whose
+            drivers are told the rest only; see ``gravity`` of `opspace.Controller`.
         disturbances: What the controller's model does not know.
 
     Raises:
@@ -49,6 +51,7 @@ class Plant:
         dt: float = 0.001,
         friction: bool = False,
         torque_limits: bool = True,
+        adds_gravity: bool = False,
         disturbances: Disturbances = NO_DISTURBANCES,
     ) -> None:
         if not (math.isfinite(dt) and dt > 0.0):
@@ -77,6 +80,8 @@ class Plant:
         disturbances.spoil(self.model, robot.torque_limit)
         self._limit = robot.torque_limit if torque_limits else np.full(robot.nv, np.inf)
         self._robot = robot
+        self.adds_gravity = adds_gravity
+        self._own_model = robot.fresh() if adds_gravity else None
         self._wire = Wire(round(disturbances.delay / dt))
         self._hand = Hand(robot, disturbances.pushes)
         self._sensors = disturbances.sensors()
@@ -136,7 +141,11 @@ class Plant:
         Args:
             tau: (n,) N·m.
         """
-        applied = np.clip(self._wire.send(tau), -self._limit, self._limit)
+        asked = self._wire.send(tau)
+        if self._own_model is not None:
+            self._own_model.update(self.q, self.v)
+            asked = asked + self._own_model.gravity
+        applied = np.clip(asked, -self._limit, self._limit)
         push = self._hand.torque(self.t, self.data.qpos, self.data.qvel)
         self.data.qfrc_applied[:] = applied if push is None else applied + push
         self._mujoco.mj_step(self.model, self.data)
