@@ -148,7 +148,9 @@ def assign_roles(found: Sequence[FileJoint], choice: JointChoice, file: str) -> 
                 locked[name] = joint.home
         elif joint.why_held and (asked is None or joint.never):
             if asked is not None:
-                raise ModelError(f"{file}: joint {name!r} cannot be controlled: {joint.why_held} it")
+                raise ModelError(
+                    f"{file}: joint {name!r} cannot be controlled: {joint.why_held} it"
+                )
             locked[name] = joint.home
             reasons.setdefault(joint.why_held, []).append(joint.thing or name)
     followers = _follow(couplings, locked, file)

@@ -85,26 +85,56 @@ def home_configuration(model: mujoco.MjModel) -> np.ndarray:
 
 
 def _driven(model: mujoco.MjModel) -> tuple[set[int], set[int]]:
-    """Return the joints with a motor of their own, and those that share one by a tendon."""
-    own = set(np.flatnonzero(model.jnt_actfrclimited).tolist())
-    together: set[int] = set()
-    for kind, target in zip(model.actuator_trntype, model.actuator_trnid[:, 0], strict=True):
-        if int(kind) in ON_JOINT:
-            own.add(int(target))
-        elif int(kind) == mujoco.mjtTrn.mjTRN_TENDON:
-            pulled = _wrapped(model, int(target))
-            (own if len(pulled) == 1 else together).update(pulled)
-    if not len(model.actuator_trntype) and not own:
-        own = {j for j in range(model.njnt) if int(model.jnt_type[j]) != FREE}
-    return own, together - own
+    """Return the joints that motors drive each on its own, and those that they drive together."""
+    arms = [_arms(model, int(k), int(i)) for k, i in _transmissions(model)]
+    arms += [{int(j): 1.0} for j in np.flatnonzero(model.jnt_actfrclimited)]
+    if not arms:
+        return {j for j in range(model.njnt) if int(model.jnt_type[j]) != FREE}, set()
+    B = np.zeros((len(arms), model.njnt))
+    for row, levers in zip(B, arms, strict=True):
+        for joint, lever in levers.items():
+            row[joint] = lever
+    # A joint is driven on its own where some combination of the motors moves it alone.
+    alone = np.einsum("ji,ij->j", np.linalg.pinv(B), B) > 1.0 - 1e-9
+    own = set(np.flatnonzero(alone).tolist())
+    for kind, target in _transmissions(model):
+        # What these give depends on the posture; every joint before them may be driven.
+        own |= set(_before(model, int(kind), int(target)))
+    return own, set(np.flatnonzero(B.any(axis=0)).tolist()) - own
 
 
-def _wrapped(model: mujoco.MjModel, tendon: int) -> set[int]:
+def _transmissions(model: mujoco.MjModel) -> list[tuple[int, int]]:
+    return list(zip(model.actuator_trntype, model.actuator_trnid[:, 0], strict=True))
+
+
+def _arms(model: mujoco.MjModel, kind: int, target: int) -> dict[int, float]:
+    """Return the joints that an actuator turns, with levers, as far as these are constant."""
+    if kind in ON_JOINT:
+        return {target: 1.0}
+    return _wrapped(model, target) if kind == mujoco.mjtTrn.mjTRN_TENDON else {}
+
+
+def _wrapped(model: mujoco.MjModel, tendon: int) -> dict[int, float]:
     """Return the joints that a tendon acts on; empty for one that runs through space."""
     first = int(model.tendon_adr[tendon])
     wraps = range(first, first + int(model.tendon_num[tendon]))
-    on_joints = all(model.wrap_type[w] == mujoco.mjtWrap.mjWRAP_JOINT for w in wraps)
-    return {int(model.wrap_objid[w]) for w in wraps} if on_joints else set()
+    if any(model.wrap_type[w] != mujoco.mjtWrap.mjWRAP_JOINT for w in wraps):
+        return {}
+    return {int(model.wrap_objid[w]): float(model.wrap_prm[w]) for w in wraps}
+
+
+def _before(model: mujoco.MjModel, kind: int, target: int) -> Iterator[int]:
+    """Return the joints before a site that is pushed, or before those that a tendon runs through."""
+    sites: list[int] = []
+    if kind in (mujoco.mjtTrn.mjTRN_SITE, mujoco.mjtTrn.mjTRN_SLIDERCRANK):
+        sites = [target]
+    elif kind == mujoco.mjtTrn.mjTRN_TENDON:
+        first = int(model.tendon_adr[target])
+        wraps = range(first, first + int(model.tendon_num[target]))
+        on_sites = mujoco.mjtWrap.mjWRAP_SITE
+        sites = [int(model.wrap_objid[w]) for w in wraps if model.wrap_type[w] == on_sites]
+    bodies = {body for site in sites for body in _path(model, int(model.site_bodyid[site]))}
+    return (j for j in range(model.njnt) if int(model.jnt_bodyid[j]) in bodies)
 
 
 def _things(model: mujoco.MjModel, driven: set[int]) -> set[int]:

@@ -114,9 +114,7 @@ def _zero(model: mujoco.MjModel) -> dict[str, float]:
     return {name: float(model.qpos0[place]) for name, place in places}
 
 
-def mjcf_spec(
-    path: Path, floating_base: bool, choice: JointChoice = JointChoice()
-) -> MjcfRobot:
+def mjcf_spec(path: Path, floating_base: bool, choice: JointChoice = JointChoice()) -> MjcfRobot:
     """Read an MJCF file and hold the joints that are not controlled.
 
     Args:

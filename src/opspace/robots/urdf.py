@@ -24,7 +24,16 @@ from opspace.robots.urdf_pose import held_at
 
 VECTORS = {"xyz", "rpy"}
 MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
-NUMBERS = VECTORS | {*MOMENTS, "value", "lower", "upper", "effort", "velocity", "multiplier", "offset"}
+NUMBERS = VECTORS | {
+    *MOMENTS,
+    "value",
+    "lower",
+    "upper",
+    "effort",
+    "velocity",
+    "multiplier",
+    "offset",
+}
 MOVING = ("revolute", "continuous", "prismatic")
 
 
@@ -310,17 +319,13 @@ def _tool(urdf: Urdf) -> str:
     """
     carrier, above = _above(urdf)
     soft = {name for c in urdf.roles.couplings for name in (c.follower, c.leader)}
-    hand = hand_of(
-        ((j.name, above[j.parent], carrier[j.parent]) for j in urdf.moving_joints), soft
-    )
+    hand = hand_of(((j.name, above[j.parent], carrier[j.parent]) for j in urdf.moving_joints), soft)
     depth, beyond = {urdf.root: (0, 0)}, {urdf.root: False}
     for joint in urdf.joints:
         moving, total = depth[joint.parent]
         depth[joint.child] = (moving + joint.moving, total + 1)
         held = joint.name in urdf.roles.locked and joint.element.get("type") in MOVING
-        beyond[joint.child] = (
-            joint.name in hand if joint.moving else held or beyond[joint.parent]
-        )
+        beyond[joint.child] = joint.name in hand if joint.moving else held or beyond[joint.parent]
     own = [link for link in depth if not beyond[link]]
     return max(own, key=lambda link: depth[link])
 
