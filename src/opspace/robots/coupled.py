@@ -33,8 +33,8 @@ class CoupledRobot(AdapterBase):
         """
         super().__init__(description)
         self._model = model
-        self.spread = Spread.of(model.joint_names, description.couplings)
-        self._G = self.spread.G
+        self.spread = self._all = Spread.of(model.joint_names, description.couplings)
+        self._G = self._all.G
         self._ids = {name: model.frame_id(name) for name in self.frame_names}
         self._M, self._bias = np.zeros((self.nv, self.nv)), np.zeros(self.nv)
         self._M_view, self._bias_view = self._M.view(), self._bias.view()
@@ -76,7 +76,7 @@ class CoupledRobot(AdapterBase):
 
     def _compute(self) -> None:
         G, model = self._G, self._model
-        model.update(self.spread.positions(self._q), G @ self._v)
+        model.update(self._all.positions(self._q), G @ self._v)
         self._M[:] = G.T @ model.M @ G
         self._bias[:] = G.T @ model.bias
 

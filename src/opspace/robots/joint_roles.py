@@ -60,6 +60,9 @@ class JointChoice:
         return cls(None if joints is None else tuple(joints), held)
 
 
+ALL_WITH_A_MOTOR = JointChoice()
+
+
 @dataclass(frozen=True)
 class FileJoint:
     """A joint as its file describes it.
@@ -213,8 +216,8 @@ def hand_of(moving: Iterable[tuple[str, str | None, str]], soft: Collection[str]
     joints = list(moving)
     before = {name: parent for name, parent, _ in joints}
     arm: set[str | None] = set()
-    for name in before:
-        above = before[name] if name not in soft else None
+    for name, parent in before.items():
+        above = parent if name not in soft else None
         while above is not None:
             arm.add(above)
             above = before[above]

@@ -12,7 +12,7 @@ from pathlib import Path
 from opspace.errors import ModelError, missing_extra
 from opspace.robots.adapter import AdapterBase
 from opspace.robots.description import Description
-from opspace.robots.joint_roles import JointChoice
+from opspace.robots.joint_roles import ALL_WITH_A_MOTOR, JointChoice
 from opspace.robots.protocol import Robot
 from opspace.robots.urdf import describe_urdf, read_urdf
 
@@ -33,7 +33,7 @@ class RobotFile:
 
 
 def read_robot(
-    path: Path, backend: str, floating_base: bool, choice: JointChoice = JointChoice()
+    path: Path, backend: str, floating_base: bool, choice: JointChoice = ALL_WITH_A_MOTOR
 ) -> RobotFile:
     """Read a URDF or MJCF file for one dynamics library.
 

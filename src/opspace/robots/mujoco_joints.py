@@ -69,7 +69,7 @@ def file_joints(model: mujoco.MjModel) -> list[FileJoint]:
 
 def equality_warnings(model: mujoco.MjModel) -> Iterator[str]:
     """Name the active equalities that the controller does not follow, but for those of joints."""
-    for i in np.flatnonzero(model.eq_active0):
+    for i in map(int, np.flatnonzero(model.eq_active0)):
         kind = int(model.eq_type[i])
         if kind != JOINT and not (kind in (CONNECT, WELD) and _one_tree(model, i)):
             name = model.equality(i).name or f"equality{i}"
@@ -159,7 +159,7 @@ def _ends(model: mujoco.MjModel, i: int) -> tuple[int, int]:
 def _in_loops(model: mujoco.MjModel) -> set[int]:
     """Return the joints between two bodies of one tree that an equality ties together."""
     found: set[int] = set()
-    for i in np.flatnonzero(model.eq_active0):
+    for i in map(int, np.flatnonzero(model.eq_active0)):
         if int(model.eq_type[i]) in (CONNECT, WELD) and _one_tree(model, i):
             one, other = (set(_path(model, body)) for body in _ends(model, i))
             found |= {j for j in range(model.njnt) if int(model.jnt_bodyid[j]) in one ^ other}
@@ -178,7 +178,7 @@ def _equalities(
     """Return the joints that curves bind, and the followers of others along straight lines."""
     bent: set[int] = set()
     found: dict[int, Coupling] = {}
-    for i in np.flatnonzero(model.eq_active0):
+    for i in map(int, np.flatnonzero(model.eq_active0)):
         if int(model.eq_type[i]) != JOINT:
             continue
         one, other = int(model.eq_obj1id[i]), int(model.eq_obj2id[i])

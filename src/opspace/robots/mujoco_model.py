@@ -15,9 +15,16 @@ import numpy as np
 from opspace.errors import ModelError
 from opspace.robots.adapter import held_joints
 from opspace.robots.description import BASE_JOINT, WORLD, Description, mid_range
-from opspace.robots.joint_roles import JointChoice, JointRoles, assign_roles, hand_of
+from opspace.robots.joint_roles import (
+    ALL_WITH_A_MOTOR,
+    JointChoice,
+    JointRoles,
+    assign_roles,
+    hand_of,
+)
 from opspace.robots.joint_units import effort_unit
 from opspace.robots.mujoco_joints import equality_warnings, file_joints
+from opspace.robots.mujoco_meshes import drop_missing
 from opspace.robots.mujoco_motors import ON_JOINT, motor_warnings, read_motors
 from opspace.robots.mujoco_names import (
     BALL,
@@ -114,7 +121,7 @@ def _zero(model: mujoco.MjModel) -> dict[str, float]:
     return {name: float(model.qpos0[place]) for name, place in places}
 
 
-def mjcf_spec(path: Path, floating_base: bool, choice: JointChoice = JointChoice()) -> MjcfRobot:
+def mjcf_spec(path: Path, floating_base: bool, choice: JointChoice = ALL_WITH_A_MOTOR) -> MjcfRobot:
     """Read an MJCF file and hold the joints that are not controlled.
 
     Args:
@@ -138,6 +145,7 @@ def mjcf_spec(path: Path, floating_base: bool, choice: JointChoice = JointChoice
         raise _refused(path, error) from None
     if floating_base:
         _free_mjcf(spec, path)
+    missing = drop_missing(spec, path)
     # A link that is held keeps its frame.
     spec.compiler.fusestatic = False
     model = compile_spec(spec, path)
@@ -145,7 +153,7 @@ def mjcf_spec(path: Path, floating_base: bool, choice: JointChoice = JointChoice
     names = joint_names(model)
     held = {int(b) for b, n in zip(model.jnt_bodyid, names, strict=True) if n in roles.locked}
     hold_joints(spec, model, roles)
-    return MjcfRobot(spec, roles, frozenset(held), tuple(equality_warnings(model)))
+    return MjcfRobot(spec, roles, frozenset(held), (*missing, *equality_warnings(model)))
 
 
 def urdf_spec(urdf: Urdf, floating_base: bool) -> mujoco.MjSpec:

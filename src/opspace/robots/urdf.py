@@ -67,7 +67,7 @@ class Urdf:
     root: str
     links: dict[str, ET.Element | None]
     joints: tuple[UrdfJoint, ...]
-    roles: JointRoles = JointRoles()
+    roles: JointRoles
 
     @property
     def moving_joints(self) -> tuple[UrdfJoint, ...]:
