@@ -10,10 +10,13 @@ import numpy as np
 import pytest
 
 import opspace as osc
-from opspace import ModelError, ModelWarning, UnknownNameError, load_robot
+from opspace import ModelError, ModelWarning, ScenarioError, UnknownNameError, load_robot
 from opspace.robots import Robot
 from opspace.robots.adapter import spread_of
 from opspace.runs.check import check_robot
+from opspace.scenario import scenario_from
+from opspace.scenario.build import build_robot
+from tests.cli.test_cli import run
 from tests.robots.hands_and_scenes import GRIPPER, MOTORS, arm_on_a_table, arm_with_fingers
 from tests.robots.samples import BACKENDS
 
@@ -350,3 +353,28 @@ def test_reference_and_posture_by_name(tmp_path: Path) -> None:
     robot = load_robot(path, locked=["f?"], reference={"j2": 0.7})
     np.testing.assert_array_equal(robot.q_reference, [0.0, 0.7])
     np.testing.assert_array_equal(load_robot(path, locked=["f?"], reference=[1, 2]).q, [1.0, 2.0])
+
+
+def test_a_scenario_says_the_same(tmp_path: Path) -> None:
+    path = arm_with_fingers(tmp_path / "r.urdf", "", '<mimic joint="f1"/>')
+    said = {"joints": ["j*"], "locked": {"f1": 0.3}, "tool": "g"}
+    data = {"robot": str(path), "duration": 0.1, "tasks": {"hold": {"type": "posture", "level": 0}}}
+    robot = build_robot(scenario_from(data | said))
+    assert robot.joint_names == ("j1", "j2")
+    assert robot.tool == "g"
+    assert check_robot(robot).locked == {"f1": 0.3, "f2": 0.3, "f3": 0.0}
+    for key, wrong in (("joints", ["k*"]), ("locked", {"k": 0.1}), ("tool", "k")):
+        with pytest.raises(ScenarioError, match=key):
+            build_robot(scenario_from(data | {key: wrong}))
+
+
+def test_check_names_what_is_held_and_what_follows(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = arm_with_fingers(tmp_path / "r.urdf", "", '<mimic joint="f1" multiplier="-2"/>')
+    status, printed, _ = run(capsys, "check", str(path), "--lock", "f3=0.5", "--lock", "j1")
+    assert status == 0
+    assert "held: f3 at 0.5\nheld: j1 at 0\nfollows: f2 = -2 f1\n" in printed
+    status, _, error = run(capsys, "check", str(path), "--lock", "f3=half")
+    assert (status, error.count("\n")) == (2, 1)
+    assert "--lock f3=half: the position is no number" in error
