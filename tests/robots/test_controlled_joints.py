@@ -374,7 +374,7 @@ def test_check_names_what_is_held_and_what_follows(
     path = arm_with_fingers(tmp_path / "r.urdf", "", '<mimic joint="f1" multiplier="-2"/>')
     status, printed, _ = run(capsys, "check", str(path), "--lock", "f3=0.5", "--lock", "j1")
     assert status == 0
-    assert "held: f3 at 0.5\nheld: j1 at 0\nfollows: f2 = -2 f1\n" in printed
+    assert "held: j1 at 0\nheld: f3 at 0.5\nfollows: f2 = -2 f1\n" in printed
     status, _, error = run(capsys, "check", str(path), "--lock", "f3=half")
     assert (status, error.count("\n")) == (2, 1)
     assert "--lock f3=half: the position is no number" in error

@@ -87,9 +87,9 @@ def home_configuration(model: mujoco.MjModel) -> np.ndarray:
 def _driven(model: mujoco.MjModel) -> tuple[set[int], set[int]]:
     """Return the joints that motors drive each on its own, and those that they drive together."""
     arms = [_arms(model, int(k), int(i)) for k, i in _transmissions(model)]
-    arms += [{int(j): 1.0} for j in np.flatnonzero(model.jnt_actfrclimited)]
     if not arms:
         return {j for j in range(model.njnt) if int(model.jnt_type[j]) != FREE}, set()
+    arms += [{int(j): 1.0} for j in np.flatnonzero(model.jnt_actfrclimited)]
     B = np.zeros((len(arms), model.njnt))
     for row, levers in zip(B, arms, strict=True):
         for joint, lever in levers.items():
