@@ -365,6 +365,17 @@ def sweep(
 @app.command(epilog="Example: opspace check ur5")
 def check(
     robot: Annotated[str, typer.Argument(help="Name of a robot, or path of a .urdf or .xml file.")],
+    joints: Annotated[
+        list[str] | None,
+        typer.Option(metavar="NAME", help='Joint to control, or pattern ("left_*"); repeatable.'),
+    ] = None,
+    locked: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--lock", metavar="NAME[=POSITION]", help="Joint to hold, rad or m; repeatable."
+        ),
+    ] = None,
+    tool: Annotated[str | None, typer.Option(help="Default tool frame.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of tables.")] = False,
 ) -> None:
     """Tell what the controller will see of a robot."""
@@ -374,12 +385,18 @@ def check(
 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ModelWarning)  # the report has them
-        report = check_robot(load_robot(robot))
+        held = dict(_position(text) for text in locked or ())
+        report = check_robot(load_robot(robot, joints=joints, locked=held, tool=tool))
     if as_json:
         print(json.dumps(to_plain(report), indent=1, ensure_ascii=False))
         return
     print(f"{report.robot}: {report.dof} degrees of freedom, tool {report.tool!r}")
-    print(f"file: {report.source}\n")
+    print(f"file: {report.source}")
+    for joint, position in report.locked.items():
+        print(f"held: {joint}" + ("" if position is None else f" at {position:g}"))
+    for relation in report.coupled:
+        print(f"follows: {relation}")
+    print()
     _print_table(*joints_table(report.joints))
     for task, sigma in report.sigma.items():
         values = ", ".join(f"{value:.3g}" for value in sigma)
@@ -389,6 +406,17 @@ def check(
     print(f"\nbuffer: a direction is absent below {lower:g} and fully active above {upper:g}")
     for warning in report.warnings:
         print(f"warning: {warning}")
+
+
+def _position(text: str) -> tuple[str, float | None]:
+    """Read NAME or NAME=POSITION."""
+    name, given, position = text.partition("=")
+    try:
+        return name, float(position) if given else None
+    except ValueError:
+        from opspace.errors import InputError
+
+        raise InputError(f"--lock {text}: the position is no number") from None
 
 
 @app.command(

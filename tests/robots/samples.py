@@ -79,7 +79,8 @@ MJCF = """
       </body>
     </body>
   </worldbody>
-  <actuator><motor joint="turn" gear="5" ctrlrange="-3 4"/><motor joint="wrist"/></actuator>
+  <actuator><motor joint="turn" gear="5" ctrlrange="-3 4"/><motor joint="wrist"/>
+    <motor joint="ball" gear="1"/></actuator>
   <keyframe><key name="home" qpos="0 0 1 1 0 0 0 0.4 0.1 1 0 0 0 0.3"/></keyframe>
 </mujoco>
 """

@@ -17,7 +17,7 @@ from opspace.robots.rigid_model import rigid_model
 from tests.robots.samples import BACKENDS, NAMES, random_state
 
 # Its motors are not alike in both directions, see tests/robots/test_motors.py.
-pytestmark = pytest.mark.filterwarnings("ignore:medley. the motor of")
+pytestmark = pytest.mark.filterwarnings("ignore:medley. (the motor of|what actuators)")
 
 
 def assert_same(robot: Robot, seed: int, fast: float = 1.0) -> None:

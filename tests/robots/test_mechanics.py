@@ -14,7 +14,7 @@ from opspace.robots.urdf_export import inertia
 from tests.robots.samples import BACKENDS, NAMES, random_state
 
 # Its motors are not alike in both directions, see tests/robots/test_motors.py.
-pytestmark = pytest.mark.filterwarnings("ignore:medley. the motor of")
+pytestmark = pytest.mark.filterwarnings("ignore:(medley|plain). (the motor of|what actuators)")
 
 STEP = 1e-6
 

@@ -8,7 +8,6 @@ import mujoco
 import numpy as np
 import pytest
 
-from opspace.errors import ModelError
 from opspace.robots import load_robot
 from opspace.robots.mujoco_model import mujoco_model
 from tests.robots.samples import NAMES, URDF, random_state
@@ -67,11 +66,10 @@ def test_scenery_is_added_only_where_there_is_none(files: dict[str, Path], tmp_p
     assert (model.geom_type == mujoco.mjtGeom.mjGEOM_PLANE).sum() == 1
 
 
-def test_joints_of_a_urdf_can_be_locked(files: dict[str, Path]) -> None:
+def test_joints_can_be_locked(files: dict[str, Path]) -> None:
     model = mujoco_model(str(files["oddity"]), locked_joints=["slider"])
     assert model.nv == 2
-    with pytest.raises(ModelError, match="URDF files only"):
-        mujoco_model(files["medley"], locked_joints=["turn"])
+    assert mujoco_model(files["medley"], locked_joints=["turn"]).nv == 11
 
 
 def test_a_massless_moving_link_is_carried(tmp_path: Path) -> None:

@@ -64,9 +64,11 @@ def test_the_fingers_of_the_panda_are_locked() -> None:
     assert robot.joint_names[-1] == "panda_joint7"
     assert robot.source is not None
     free = load_robot(robot.source)
-    assert free.nv == 9
-    q = np.append(robot.q_reference, [0.0, 0.0])
-    free.update(q, np.zeros(9))
+    # The second finger follows the first one, and neither is a tool.
+    assert free.nv == 8
+    assert free.tool == "panda_hand_tcp"
+    q = np.append(robot.q_reference, 0.0)
+    free.update(q, np.zeros(8))
     np.testing.assert_allclose(free.M[:7, :7], robot.M, atol=1e-12)
 
 

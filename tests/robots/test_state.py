@@ -15,7 +15,7 @@ from opspace.robots import Robot, load_robot
 from tests.robots.samples import BACKENDS, random_state
 
 # Its motors are not alike in both directions, see tests/robots/test_motors.py.
-pytestmark = pytest.mark.filterwarnings("ignore:medley. the motor of")
+pytestmark = pytest.mark.filterwarnings("ignore:medley. (the motor of|what actuators)")
 
 
 @pytest.fixture(params=BACKENDS)

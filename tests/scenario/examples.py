@@ -7,6 +7,9 @@ description: every kind of entry
 robot: puma560
 backend: mujoco
 floating_base: false
+joints: ["joint?"]
+locked: {}
+tool: tool
 duration: 1e1
 dt: 2e-3
 seed: 5

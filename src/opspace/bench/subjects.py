@@ -11,7 +11,7 @@ import numpy as np
 from opspace.bench.scenes import Scene
 from opspace.controller import ReferenceController
 from opspace.controller.warm_up import compiled_tick
-from opspace.robots.adapter import AdapterBase
+from opspace.robots.adapter import AdapterBase, held_joints
 from opspace.robots.protocol import Robot
 from opspace.tasks import OrientationTask, PoseTask, PositionTask, PostureTask
 
@@ -71,7 +71,7 @@ def placo_tick(scene: Scene) -> Tick:
     robot = scene.robot()
     source = robot.source
     assert source is not None
-    urdf = read_urdf(source, robot.locked_joints)
+    urdf = read_urdf(source, held_joints(robot))
     wrapper = placo.RobotWrapper(
         "", int(placo.Flags.ignore_collisions), to_xml(urdf, inertias=True)
     )

@@ -76,6 +76,7 @@ class Program:
         import tsid
         from pinocchio import StdVec_StdString
 
+        from opspace.robots.adapter import held_joints
         from opspace.robots.urdf import read_urdf
         from opspace.robots.urdf_export import to_xml
 
@@ -83,7 +84,7 @@ class Program:
         source = controller.robot.source
         if source is None or source.suffix != ".urdf":
             raise InputError(f"the method tsid needs a robot from a URDF, not {source}")
-        urdf = read_urdf(source, controller.robot.locked_joints)
+        urdf = read_urdf(source, held_joints(controller.robot))
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / "robot.urdf"
             path.write_text(to_xml(urdf, inertias=True), encoding="utf-8")

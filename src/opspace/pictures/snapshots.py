@@ -22,6 +22,7 @@ from opspace.pictures.offscreen import (
     fit_view,
 )
 from opspace.record import Recording
+from opspace.robots.adapter import spread_of
 from opspace.robots.protocol import Robot
 
 try:
@@ -30,7 +31,7 @@ try:
 except ImportError as error:
     raise missing_extra("pillow" if error.name == "PIL" else "mujoco", "sim") from None
 
-from opspace.robots.mujoco_model import mujoco_model
+from opspace.robots.mujoco_model import model_of
 from opspace.robots.mujoco_names import joint_names
 
 __all__ = ["SnapshotUnavailableError", "render", "snapshot_strip", "snapshots"]
@@ -121,11 +122,11 @@ def render(
         raise ModelError(f"robot {robot.name!r} was not read from a file that MuJoCo could render")
     if not times or not len(recording):
         raise InputError("a snapshot needs a time and a recording with a tick")
-    model = mujoco_model(robot.source, robot.floating_base, robot.locked_joints)
+    model = model_of(robot)
     # The shadow map must reach beyond what is in view, or its edge speckles the floor.
     model.vis.map.shadowclip, model.vis.quality.shadowsize = 4.0, 8192
     data = mujoco.MjData(model)
-    ticks = [_tick(model, recording, time, task) for time in times]
+    ticks = [_tick(model, robot, recording, time, task) for time in times]
     view = _choose_view(model, data, ticks, size, direction)
     with canvas(model, size) as drawing:
         for tick in ticks:
@@ -187,11 +188,18 @@ def _index(recording: Recording, time: float) -> int:
     return int(np.abs(recording.t - time).argmin())
 
 
-def _tick(model: mujoco.MjModel, recording: Recording, time: float, task: str) -> _Tick:
-    row, qpos = _index(recording, time), np.array(model.qpos0)
-    for start, stop, name in _coordinates(model):
-        single = stop - start == 1
-        qpos[start:stop] = recording[name][row] if single else recording.group(name)[row]
+def _tick(
+    model: mujoco.MjModel, robot: Robot, recording: Recording, time: float, task: str
+) -> _Tick:
+    row, spread = _index(recording, time), spread_of(robot)
+    if spread is None:
+        qpos = np.array(model.qpos0)
+        for start, stop, name in _coordinates(model):
+            single = stop - start == 1
+            qpos[start:stop] = recording[name][row] if single else recording.group(name)[row]
+    else:
+        own = [recording[f"q/{name}"][row] for name in robot.joint_names]
+        qpos = spread.positions(np.array(own))
     tool = np.column_stack([recording[f"tool/{axis}"] for axis in "xyz"])
     error = [f"tasks/{task}/error/{i}" for i in range(3)]
     target = None

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from opspace.controller import ReferenceController
+from opspace.robots.adapter import held_joints
 from opspace.robots.catalogue import CATALOGUE, locate
 from opspace.robots.joint_units import joint_units
 from opspace.robots.protocol import Robot
@@ -50,7 +51,7 @@ def _robot(controller: ReferenceController) -> dict[str, Any]:
         "name": robot.name,
         "file": None if _has_name(robot) else str(robot.source),
         "floating_base": robot.floating_base,
-        "locked_joints": list(robot.locked_joints),
+        "locked_joints": dict(held_joints(robot)),
         "tool": robot.tool,
         "gravity": controller.gravity,
         "joints": list(robot.joint_names),

@@ -13,8 +13,10 @@ from numpy.typing import ArrayLike
 from opspace.errors import InputError, unknown_name
 from opspace.robots.description import Description
 from opspace.robots.motion_axes import MotionAxes
+from opspace.robots.spread import Spread
 
 if TYPE_CHECKING:
+    from opspace.robots.protocol import Robot
     from opspace.robots.rigid_model import RigidModel
 
 
@@ -50,7 +52,8 @@ class AdapterBase(ABC):
         self.torque_limit = _frozen(description.torque_limit)
         self.actuated = _frozen(description.actuated)
         self.floating_base = description.floating_base
-        self.locked_joints = description.locked_joints
+        self.locked_joints = tuple(description.locked)
+        self.spread: Spread | None = None
         self._ids = {name: i for i, name in enumerate(self.frame_names)}
         self._q = np.array(description.q_reference, dtype=float)
         self._v = np.zeros(self.nv)
@@ -296,3 +299,15 @@ def _view(array: np.ndarray) -> np.ndarray:
     view = array.view()
     view.setflags(write=False)
     return view
+
+
+def held_joints(robot: Robot) -> Mapping[str, float | None]:
+    """Tell where joints of the file are held that the robot does not control, rad or m."""
+    if isinstance(robot, AdapterBase):
+        return robot.description.locked
+    return dict.fromkeys(robot.locked_joints, 0.0)
+
+
+def spread_of(robot: Robot) -> Spread | None:
+    """Tell how the joints of the file follow those of the robot; None where none follows."""
+    return robot.spread if isinstance(robot, AdapterBase) else None

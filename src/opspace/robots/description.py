@@ -8,6 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
+from opspace.robots.joint_roles import Coupling
+
 WORLD = "world"
 BASE_JOINT = "floating_base"
 
@@ -43,6 +45,9 @@ class Description:
         quaternions: Index in q of the first coordinate (w) of every quaternion.
         joint_units: (nv,) unit of each coordinate's position, "rad" or "m".
         springs: What pulls at the joints besides, None for nothing.
+        couplings: Joints of the file that follow one of these.
+        locked: Where joints of the file are held, rad or m; None for those with several
+            coordinates, which are held where the file has them.
         warnings: What the file says and the controller does not follow, a sentence each.
     """
 
@@ -62,7 +67,8 @@ class Description:
     actuated: np.ndarray
     quaternions: tuple[int, ...] = ()
     floating_base: bool = False
-    locked_joints: tuple[str, ...] = ()
+    couplings: tuple[Coupling, ...] = ()
+    locked: Mapping[str, float | None] = field(default_factory=dict)
     configurations: Mapping[str, np.ndarray] = field(default_factory=dict)
     springs: Springs | None = None
     warnings: tuple[str, ...] = ()

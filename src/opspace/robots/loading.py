@@ -5,12 +5,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
 from opspace.errors import ModelError, missing_extra
+from opspace.robots.adapter import AdapterBase
 from opspace.robots.description import Description
+from opspace.robots.joint_roles import ALL_WITH_A_MOTOR, JointChoice
 from opspace.robots.protocol import Robot
 from opspace.robots.urdf import describe_urdf, read_urdf
 
@@ -31,7 +33,7 @@ class RobotFile:
 
 
 def read_robot(
-    path: Path, backend: str, floating_base: bool, locked_joints: Collection[str] = ()
+    path: Path, backend: str, floating_base: bool, choice: JointChoice = ALL_WITH_A_MOTOR
 ) -> RobotFile:
     """Read a URDF or MJCF file for one dynamics library.
 
@@ -39,7 +41,7 @@ def read_robot(
         path: The file; .urdf or .xml.
         backend: "pinocchio" or "mujoco".
         floating_base: Whether to free the root link.
-        locked_joints: URDF joints to hold fixed at zero.
+        choice: Which joints are controlled, and where others are held.
 
     Returns:
         The file, ready to be built.
@@ -54,7 +56,7 @@ def read_robot(
         raise ModelError(f"{path}: a robot file ends in {' or '.join(SUFFIXES)}")
     read = _read_urdf if path.suffix == ".urdf" else _read_mjcf
     try:
-        robot = read(path, backend, floating_base, locked_joints)
+        robot = read(path, backend, floating_base, choice)
     except ModuleNotFoundError as error:
         if error.name != "mujoco":
             raise
@@ -65,37 +67,47 @@ def read_robot(
     return robot
 
 
-def _read_urdf(
-    path: Path, backend: str, floating_base: bool, locked_joints: Collection[str]
-) -> RobotFile:
-    urdf = read_urdf(path, locked_joints, floating_base)
+def _read_urdf(path: Path, backend: str, floating_base: bool, choice: JointChoice) -> RobotFile:
+    urdf = read_urdf(path, choice.locked, floating_base, choice.joints)
     description = describe_urdf(urdf, floating_base)
     if backend == "pinocchio":
         from opspace.robots.pinocchio import PinocchioRobot
         from opspace.robots.pinocchio_model import model_from_urdf
 
         pinocchio_model = model_from_urdf(urdf, floating_base)
-        return RobotFile(description, lambda d: PinocchioRobot(d, pinocchio_model))
+        return _file(description, lambda d: PinocchioRobot(d, pinocchio_model))
     from opspace.robots.mujoco import MujocoRobot
     from opspace.robots.mujoco_model import compile_spec, urdf_spec
 
     mujoco_model = compile_spec(urdf_spec(urdf, floating_base), path)
-    return RobotFile(description, lambda d: MujocoRobot(d, mujoco_model))
+    return _file(description, lambda d: MujocoRobot(d, mujoco_model))
 
 
-def _read_mjcf(
-    path: Path, backend: str, floating_base: bool, locked_joints: Collection[str]
-) -> RobotFile:
+def _read_mjcf(path: Path, backend: str, floating_base: bool, choice: JointChoice) -> RobotFile:
     from opspace.robots.mujoco_model import compile_spec, describe_mujoco, mjcf_spec
 
-    compiled = compile_spec(mjcf_spec(path, floating_base, locked_joints), path)
-    description = describe_mujoco(compiled, path)
+    read = mjcf_spec(path, floating_base, choice)
+    compiled = compile_spec(read.spec, path)
+    if compiled.nv == 0:
+        raise ModelError(f"{path}: the robot has no joint that moves")
+    description = describe_mujoco(compiled, path, read)
     if backend == "pinocchio":
         from opspace.robots.pinocchio import PinocchioRobot
         from opspace.robots.pinocchio_model import carried_from_mujoco, model_from_mujoco
 
         model, carried = model_from_mujoco(compiled), carried_from_mujoco(compiled)
-        return RobotFile(description, lambda d: PinocchioRobot(d, model, carried))
+        return _file(description, lambda d: PinocchioRobot(d, model, carried))
     from opspace.robots.mujoco import MujocoRobot
 
-    return RobotFile(description, lambda d: MujocoRobot(d, compiled))
+    return _file(description, lambda d: MujocoRobot(d, compiled))
+
+
+def _file(description: Description, build: Callable[[Description], AdapterBase]) -> RobotFile:
+    """Leave the joints that lead, where others follow them."""
+    if not description.couplings:
+        return RobotFile(description, build)
+    from opspace.robots.coupled import CoupledRobot, coupled_description
+
+    return RobotFile(
+        coupled_description(description), lambda d: CoupledRobot(d, build(description))
+    )

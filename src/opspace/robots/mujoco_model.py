@@ -5,15 +5,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
 
 from opspace.errors import ModelError
+from opspace.robots.adapter import held_joints
 from opspace.robots.description import BASE_JOINT, WORLD, Description, mid_range
+from opspace.robots.joint_roles import (
+    ALL_WITH_A_MOTOR,
+    JointChoice,
+    JointRoles,
+    assign_roles,
+    hand_of,
+)
 from opspace.robots.joint_units import effort_unit
+from opspace.robots.mujoco_joints import equality_warnings, file_joints
+from opspace.robots.mujoco_meshes import drop_missing
 from opspace.robots.mujoco_motors import ON_JOINT, motor_warnings, read_motors
 from opspace.robots.mujoco_names import (
     BALL,
@@ -22,11 +33,14 @@ from opspace.robots.mujoco_names import (
     NamedFrame,
     coordinate_names,
     frames,
+    joint_names,
     key_names,
     shared_names,
 )
+from opspace.robots.mujoco_reduce import couple, hold_joints
 from opspace.robots.mujoco_scene import add_scenery, add_skeleton
 from opspace.robots.passive_forces import force_warnings, read_springs
+from opspace.robots.protocol import Robot
 from opspace.robots.urdf import Urdf, read_urdf
 from opspace.robots.urdf_export import inertia, to_xml
 
@@ -35,20 +49,40 @@ NEGLIGIBLE = 1e-12
 SLIDE, HINGE = 2, 3
 
 
+class MjcfRobot(NamedTuple):
+    """An MJCF file whose joints that are not controlled have been taken out.
+
+    Attributes:
+        spec: To be compiled.
+        roles: What became of the joints.
+        held: Numbers of the bodies that lost one.
+        warnings: What else the controller does not follow, a sentence each.
+    """
+
+    spec: mujoco.MjSpec
+    roles: JointRoles
+    held: frozenset[int]
+    warnings: tuple[str, ...]
+
+
 def mujoco_model(
-    source: Path | str, floating_base: bool = False, locked_joints: Sequence[str] = ()
+    source: Path | str,
+    floating_base: bool = False,
+    locked_joints: Collection[str] | Mapping[str, float | None] = (),
 ) -> mujoco.MjModel:
     """Compile a robot file into a plant that can be simulated and rendered.
 
     The dynamics are those of the robot that ``load_robot`` gives for the same arguments, plus what
     an MJCF file says about friction and contact. A URDF is drawn as capsules between its joints; a
     floor, a sky and a light are added where there are none. Nothing that is added has mass or
-    takes part in contact.
+    takes part in contact. Joints that follow others are there, and an equality constraint binds
+    them.
 
     Args:
         source: URDF or MJCF file.
         floating_base: Whether the root link moves freely.
-        locked_joints: URDF joints to hold fixed at zero.
+        locked_joints: Joints to hold fixed, and where, rad or m; names alone are held where the
+            file has them.
 
     Returns:
         The compiled model.
@@ -58,10 +92,15 @@ def mujoco_model(
     """
     path = Path(source)
     if path.suffix == ".urdf":
-        spec = urdf_spec(read_urdf(path, locked_joints, floating_base), floating_base)
+        urdf = read_urdf(path, locked_joints, floating_base)
+        spec = urdf_spec(urdf, floating_base)
         add_skeleton(spec)
+        couple(spec, urdf.roles.couplings, {})
     else:
-        spec = mjcf_spec(path, floating_base, locked_joints)
+        read = mjcf_spec(path, floating_base, JointChoice.of(None, locked_joints))
+        spec = read.spec
+        if read.roles.couplings:
+            couple(spec, read.roles.couplings, _zero(compile_spec(spec, path)))
     add_scenery(spec)
     model = compile_spec(spec, path)
     # Where actuators carry weight, MuJoCo counts it to them; the plant drives joints without any.
@@ -69,24 +108,39 @@ def mujoco_model(
     return model
 
 
-def mjcf_spec(
-    path: Path, floating_base: bool, locked_joints: Collection[str] = ()
-) -> mujoco.MjSpec:
-    """Read an MJCF file.
+def model_of(robot: Robot) -> mujoco.MjModel:
+    """Compile the file of a robot with the same joints held and coupled; see `mujoco_model`.
+
+    Raises:
+        ModelError: The robot has no file, or MuJoCo cannot use it.
+    """
+    if robot.source is None:
+        raise ModelError(f"robot {robot.name!r} has no file that MuJoCo could load")
+    return mujoco_model(robot.source, robot.floating_base, held_joints(robot))
+
+
+def _zero(model: mujoco.MjModel) -> dict[str, float]:
+    """Return where joints of one coordinate are in the model's zero, rad or m."""
+    places = zip(joint_names(model), model.jnt_qposadr, strict=True)
+    return {name: float(model.qpos0[place]) for name, place in places}
+
+
+def mjcf_spec(path: Path, floating_base: bool, choice: JointChoice = ALL_WITH_A_MOTOR) -> MjcfRobot:
+    """Read an MJCF file and hold the joints that are not controlled.
 
     Args:
         path: The file.
         floating_base: Whether to free the root body where the file does not.
-        locked_joints: Must be empty; only the joints of a URDF can be locked.
+        choice: Which joints are controlled, and where others are held.
 
     Returns:
-        The specification, to be compiled.
+        What is to be compiled, and what became of the joints.
 
     Raises:
-        ModelError: The file does not exist, MuJoCo cannot parse it, or joints are to be locked.
+        ModelError: The file does not exist, MuJoCo cannot parse it, or joints are asked to move in
+            a way that they cannot.
+        UnknownNameError: No joint has a name that is asked for.
     """
-    if locked_joints:
-        raise ModelError(f"{path}: joints can be locked in URDF files only")
     if not path.is_file():
         raise ModelError(f"{path}: no such file")
     try:
@@ -95,7 +149,15 @@ def mjcf_spec(
         raise _refused(path, error) from None
     if floating_base:
         _free_mjcf(spec, path)
-    return spec
+    missing = drop_missing(spec, path)
+    # A link that is held keeps its frame.
+    spec.compiler.fusestatic = False
+    model = compile_spec(spec, path)
+    roles = assign_roles(file_joints(model), choice, path.name)
+    names = joint_names(model)
+    held = {int(b) for b, n in zip(model.jnt_bodyid, names, strict=True) if n in roles.locked}
+    hold_joints(spec, model, roles)
+    return MjcfRobot(spec, roles, frozenset(held), (*missing, *equality_warnings(model)))
 
 
 def urdf_spec(urdf: Urdf, floating_base: bool) -> mujoco.MjSpec:
@@ -159,11 +221,12 @@ def compile_spec(spec: mujoco.MjSpec, path: Path) -> mujoco.MjModel:
     return model
 
 
-def describe_mujoco(model: mujoco.MjModel, path: Path) -> Description:
+def describe_mujoco(model: mujoco.MjModel, path: Path, read: MjcfRobot) -> Description:
     """Collect names, limits and postures from a compiled MJCF model.
 
     Args:
         model: The compiled model.
+        read: What it was compiled from.
         path: The file it came from.
 
     Returns:
@@ -174,7 +237,7 @@ def describe_mujoco(model: mujoco.MjModel, path: Path) -> Description:
     lower, upper = _ranges(model)
     poses = map(np.array, model.key_qpos)
     keys = dict(zip(key_names(model), poses, strict=True))
-    motors = read_motors(model, names)
+    motors = read_motors(model, names).without(c.follower for c in read.roles.couplings)
     units = _units(model)
     efforts = [effort_unit(unit) for unit in units]
     return Description(
@@ -185,7 +248,7 @@ def describe_mujoco(model: mujoco.MjModel, path: Path) -> Description:
         joint_names=names,
         joint_units=units,
         frame_names=tuple(frame.name for frame in found),
-        tool=_tool(model, found),
+        tool=_tool(model, found, read),
         q_reference=keys.get("home", next(iter(keys.values()), _middle(model, lower, upper))),
         q_lower=lower,
         q_upper=upper,
@@ -195,8 +258,12 @@ def describe_mujoco(model: mujoco.MjModel, path: Path) -> Description:
         quaternions=_quaternions(model),
         floating_base=bool(free.any()),
         configurations=keys,
+        couplings=read.roles.couplings,
+        locked=read.roles.locked,
         springs=read_springs(model),
         warnings=(
+            *read.roles.warnings,
+            *read.warnings,
             *_shared(model),
             *motor_warnings(motors, names, efforts),
             *force_warnings(model, motors.limit),
@@ -281,12 +348,37 @@ def _set_inertia(body: mujoco.MjsBody, urdf: Urdf, link: str) -> None:
     body.mass, body.ipos, body.iquat, body.inertia = mass, center, quat, moments
 
 
-def _tool(model: mujoco.MjModel, frames: Sequence[NamedFrame]) -> str:
-    """Return "tool" where it exists, else the last site or body of the longest chain."""
+def _tool(model: mujoco.MjModel, frames: Sequence[NamedFrame], read: MjcfRobot) -> str:
+    """Return "tool" where it exists, else the last site or body of the longest chain.
+
+    Bodies behind a joint that is held, and those of a hand, are left out: a tool that other motors
+    move is no frame of the arm's own.
+    """
     if any(frame.name == "tool" for frame in frames):
         return "tool"
-    depth = np.zeros((model.nbody, 2), dtype=int)
+    hand = _hand(model, read.roles)
+    depth, beyond = np.zeros((model.nbody, 2), dtype=int), np.zeros(model.nbody, dtype=bool)
     for body in range(1, model.nbody):
-        depth[body] = depth[model.body_parentid[body]] + [int(model.body_dofnum[body] > 0), 1]
-    last = max((frame.body for frame in frames), key=lambda body: (*depth[body], -body))
-    return next(frame.name for frame in reversed(frames) if frame.body == last)
+        before, moves = model.body_parentid[body], bool(model.body_dofnum[body] > 0)
+        depth[body] = depth[before] + [int(moves), 1]
+        beyond[body] = body in hand if moves else (body in read.held or beyond[before])
+    own = [frame for frame in frames if not beyond[frame.body]]
+    last = max((frame.body for frame in own), key=lambda body: (*depth[body], -body))
+    return next(frame.name for frame in reversed(own) if frame.body == last)
+
+
+def _hand(model: mujoco.MjModel, roles: JointRoles) -> set[int]:
+    """Return the bodies that joints of a hand move."""
+    names, last = joint_names(model), {}
+    soft = {name for c in roles.couplings for name in (c.follower, c.leader)}
+    chain = []
+    for body in range(1, model.nbody):
+        before = int(model.body_parentid[body])
+        joint = last.get(before)
+        first = int(model.body_jntadr[body])
+        for j in range(first, first + int(model.body_jntnum[body])):
+            chain.append((names[j], joint, str(model.body_weldid[before])))
+            joint = names[j]
+        last[body] = joint
+    fingers = hand_of(chain, soft)
+    return {int(b) for b, n in zip(model.jnt_bodyid, names, strict=True) if n in fingers}

@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple
 
 import mujoco
@@ -67,6 +67,12 @@ class Actuation(NamedTuple):
     def limit(self) -> np.ndarray:
         """Return the torque that every joint has in both directions, (nv,) N·m or N."""
         return np.array([max(0.0, min(-span.least, span.most)) for span in self.spans])
+
+    def without(self, followers: Iterable[str]) -> Motors:
+        """Leave out joints that others move: what a tendon gives them is the leader's."""
+        gone = set(followers)
+        left = {t: tuple(n for n in names if n not in gone) for t, names in self.shared.items()}
+        return self._replace(shared={t: names for t, names in left.items() if len(names) > 1})
 
 
 def read_motors(model: mujoco.MjModel, joints: Sequence[str]) -> Actuation:

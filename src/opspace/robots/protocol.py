@@ -36,7 +36,7 @@ class Robot(Protocol):
         torque_limit: (nv,) in N·m or N, inf where unknown.
         actuated: (nv,) False for the coordinates of a floating base.
         floating_base: Whether the root link moves freely.
-        locked_joints: Joints of the file that this model holds fixed at zero.
+        locked_joints: Joints of the file that this model holds fixed.
     """
 
     name: str

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from warnings import warn
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from opspace.errors import ModelWarning, missing_extra, unknown_name
+from opspace.errors import ModelError, ModelWarning, missing_extra, unknown_name
 from opspace.robots.catalogue import CATALOGUE, SHIPPED, CatalogueEntry, locate
 from opspace.robots.description import Description
+from opspace.robots.joint_roles import JointChoice
 from opspace.robots.loading import SUFFIXES, RobotFile, read_robot
 from opspace.robots.protocol import Robot
 
@@ -51,36 +54,88 @@ def available_robots() -> list[RobotInfo]:
 
 
 def load_robot(
-    name_or_path: str | Path, *, backend: str = "pinocchio", floating_base: bool = False
+    name_or_path: str | Path,
+    *,
+    backend: str = "pinocchio",
+    floating_base: bool = False,
+    joints: Collection[str] | None = None,
+    locked: Collection[str] | Mapping[str, float] = (),
+    tool: str | None = None,
+    reference: ArrayLike | Mapping[str, float] | None = None,
 ) -> Robot:
     """Load a robot by name or from a URDF or MJCF file.
+
+    The robot has the joints that are controlled. What carries the others is held fixed; joints
+    that follow a controlled one (mimic in URDF, an equality of two joints in MJCF) move with it,
+    and count in its inertia and its load.
 
     Args:
         name_or_path: A name that ``available_robots`` lists, or a path ending in .urdf or .xml.
         backend: Library that computes the dynamics, "pinocchio" or "mujoco".
         floating_base: Free the root link. Humanoids and quadrupeds loaded by name are always free.
+        joints: Names or patterns ("left_*") of the joints to control; those that have a motor
+            where this is not given. All joints of a URDF count as having one, and so do those of
+            an MJCF file that has no actuator at all.
+        locked: Names or patterns of joints to hold, with the position in rad or m; names alone are
+            held where the file has them: in the key frame ``home`` or the first, else at zero.
+        tool: Default tool frame; the last of the longest chain where this is not given, short of
+            hands and of joints that are held.
+        reference: Reference posture: one number per coordinate, or positions by joint in rad or m;
+            joints that are not named stay where the file has them.
 
     Returns:
         The robot, updated at its reference posture at rest. What its file says and the controller
         does not follow is a `ModelWarning`, and stands in ``robot.description.warnings``.
 
     Raises:
-        UnknownNameError: No robot or backend has this name.
+        UnknownNameError: No robot, backend, joint or frame has this name.
         MissingExtraError: The robot's files are not installed.
-        ModelError: The file does not exist or cannot be used.
+        ModelError: The file does not exist or cannot be used, or a joint is asked to move in a way
+            that it cannot.
     """
     if backend not in BACKENDS:
         raise unknown_name("backend", backend, BACKENDS)
+    choice = JointChoice.of(joints, locked)
     if isinstance(name_or_path, Path) or Path(name_or_path).suffix in SUFFIXES:
-        file = read_robot(Path(name_or_path), backend, floating_base)
-        return _built(file, file.description)
+        file = read_robot(Path(name_or_path), backend, floating_base, choice)
+        return _built(file, _chosen(file.description, tool, reference))
     entry = _entry(name_or_path)
     path = locate(entry)
     if path is None:
         raise missing_extra(entry.package, "robots")
     free = floating_base or entry.floating_base
-    file = read_robot(path, backend, free, entry.locked_joints)
-    return _built(file, _named(file.description, name_or_path, entry))
+    if joints is None:
+        choice = replace(choice, locked={**dict.fromkeys(entry.locked_joints), **choice.locked})
+    file = read_robot(path, backend, free, choice)
+    named = _named(file.description, name_or_path, entry)
+    return _built(file, _chosen(named, tool, reference))
+
+
+def _chosen(
+    description: Description,
+    tool: str | None,
+    reference: ArrayLike | Mapping[str, float] | None,
+) -> Description:
+    """Apply tool and reference posture that somebody asked for."""
+    if tool is not None:
+        if tool not in description.frame_names:
+            raise unknown_name(f"frame of {description.name}", tool, description.frame_names)
+        description = replace(description, tool=tool)
+    if reference is None:
+        return description
+    if isinstance(reference, Mapping):
+        q, base = np.array(description.q_reference), description.nq - description.nv
+        for joint, position in reference.items():
+            if joint not in description.joint_names:
+                raise unknown_name(f"joint of {description.name}", joint, description.joint_names)
+            q[base + description.joint_names.index(joint)] = position
+    else:
+        q = np.array(reference, dtype=float)
+    if q.shape != (description.nq,) or not np.isfinite(q).all():
+        raise ModelError(
+            f"the reference posture of {description.name} must be {description.nq} finite numbers"
+        )
+    return replace(description, q_reference=q)
 
 
 def _built(file: RobotFile, description: Description) -> Robot:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import xml.etree.ElementTree as ET
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,10 +12,28 @@ import numpy as np
 
 from opspace.errors import ModelError, unknown_name
 from opspace.robots.description import BASE_JOINT, WORLD, Description, mid_range, unused
+from opspace.robots.joint_roles import (
+    Coupling,
+    FileJoint,
+    JointChoice,
+    JointRoles,
+    assign_roles,
+    hand_of,
+)
+from opspace.robots.urdf_pose import held_at
 
 VECTORS = {"xyz", "rpy"}
 MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
-NUMBERS = VECTORS | {*MOMENTS, "value", "lower", "upper", "effort", "velocity"}
+NUMBERS = VECTORS | {
+    *MOMENTS,
+    "value",
+    "lower",
+    "upper",
+    "effort",
+    "velocity",
+    "multiplier",
+    "offset",
+}
 MOVING = ("revolute", "continuous", "prismatic")
 
 
@@ -49,7 +67,7 @@ class Urdf:
     root: str
     links: dict[str, ET.Element | None]
     joints: tuple[UrdfJoint, ...]
-    locked: tuple[str, ...]
+    roles: JointRoles
 
     @property
     def moving_joints(self) -> tuple[UrdfJoint, ...]:
@@ -57,20 +75,26 @@ class Urdf:
         return tuple(j for j in self.joints if j.moving)
 
 
-def read_urdf(path: Path, locked: Collection[str] = (), floating_base: bool = False) -> Urdf:
-    """Read a URDF file; shapes, transmissions and mimic relations are left out.
+def read_urdf(
+    path: Path,
+    locked: Collection[str] | Mapping[str, float | None] = (),
+    floating_base: bool = False,
+    joints: Collection[str] | None = None,
+) -> Urdf:
+    """Read a URDF file; shapes and transmissions are left out.
 
     Args:
         path: The file.
-        locked: Joints to hold fixed at zero.
+        locked: Joints to hold fixed, and where, rad or m; at zero where only names are given.
         floating_base: Whether the root link is to move freely.
+        joints: Joints to control; None for all.
 
     Returns:
         The robot's tree.
 
     Raises:
         ModelError: The file does not exist, is no URDF, is not one tree, or its root cannot float.
-        UnknownNameError: A locked joint is not in the file.
+        UnknownNameError: A joint that is asked for or followed is not in the file.
     """
     root = _parse(path)
     _check_numbers(root, path)
@@ -82,14 +106,13 @@ def read_urdf(path: Path, locked: Collection[str] = (), floating_base: bool = Fa
     names = [_name(joint, path) for joint in elements]
     for repeated in (n for n in names if names.count(n) > 1):
         raise ModelError(f"{path}: joint {repeated!r} occurs twice")
-    for name in locked:
-        if name not in names:
-            raise unknown_name(f"joint of {path.name}", name, names)
-    joints = {_name(e, path): _joint(e, locked, links, path) for e in elements}
-    base, ordered = _depth_first(joints, links, path)
+    choice = JointChoice.of(joints, locked)
+    roles = assign_roles(_file_joints(elements, path), choice, path.name)
+    built = {_name(e, path): _joint(e, roles.locked, links, path) for e in elements}
+    base, ordered = _depth_first(built, links, path)
     if floating_base and base == WORLD:
         raise ModelError(f"{path}: the root link {WORLD!r} cannot float")
-    return Urdf(root.get("name") or path.stem, path, base, links, ordered, tuple(locked))
+    return Urdf(root.get("name") or path.stem, path, base, links, ordered, roles)
 
 
 def describe_urdf(urdf: Urdf, floating_base: bool) -> Description:
@@ -133,8 +156,9 @@ def describe_urdf(urdf: Urdf, floating_base: bool) -> Description:
         actuated=np.arange(len(names)) >= base_v,
         quaternions=(3,) if floating_base else (),
         floating_base=floating_base,
-        locked_joints=urdf.locked,
-        warnings=tuple(_warnings(moving)),
+        couplings=urdf.roles.couplings,
+        locked=urdf.roles.locked,
+        warnings=(*urdf.roles.warnings, *_warnings(moving)),
     )
 
 
@@ -182,8 +206,29 @@ def _name(element: ET.Element, path: Path) -> str:
     return name
 
 
+def _file_joints(elements: Sequence[ET.Element], path: Path) -> list[FileJoint]:
+    moving = {_name(e, path): e for e in elements if e.get("type") in MOVING}
+    names = [_name(e, path) for e in elements]
+    return [_file_joint(name, e, moving, names, path) for name, e in moving.items()]
+
+
+def _file_joint(
+    name: str, element: ET.Element, moving: Collection[str], names: Sequence[str], path: Path
+) -> FileJoint:
+    mimic = element.find("mimic")
+    if mimic is None:
+        return FileJoint(name)
+    leader = mimic.get("joint", "")
+    if leader not in names:
+        raise unknown_name(f"joint that {name!r} of {path.name} mimics,", leader, names)
+    ratio, offset = float(mimic.get("multiplier", 1.0)), float(mimic.get("offset", 0.0))
+    if leader not in moving:
+        return FileJoint(name, offset, "a fixed joint leads", never=True)
+    return FileJoint(name, coupling=Coupling(name, leader, ratio, offset))
+
+
 def _joint(
-    element: ET.Element, locked: Collection[str], links: Collection[str], path: Path
+    element: ET.Element, locked: Mapping[str, float | None], links: Collection[str], path: Path
 ) -> UrdfJoint:
     name, kind = _name(element, path), element.get("type", "")
     if kind not in (*MOVING, "fixed"):
@@ -208,6 +253,8 @@ def _joint(
         )
     if kind == "continuous" or lower == upper:
         lower, upper = -math.inf, math.inf
+    axis, slides = _axis(element, path), kind == "prismatic"
+    held = locked.get(name)
     return UrdfJoint(
         name=name,
         kind="fixed" if name in locked else kind,
@@ -217,8 +264,8 @@ def _joint(
         upper=upper,
         velocity=_largest(given, "velocity", name, path),
         effort=_largest(given, "effort", name, path),
-        axis=_axis(element, path),
-        element=element,
+        axis=axis,
+        element=element if held is None else held_at(element, axis, slides, held),
     )
 
 
@@ -265,9 +312,29 @@ def _depth_first(
 
 
 def _tool(urdf: Urdf) -> str:
-    """Return the last link of the longest chain, counted in moving and then in all joints."""
-    depth = {urdf.root: (0, 0)}
+    """Return the last link of the longest chain, counted in controlled and then in all joints.
+
+    Links behind a joint that is held, and those of a hand, are left out: a tool that other motors
+    move is no frame of the arm's own.
+    """
+    carrier, above = _above(urdf)
+    soft = {name for c in urdf.roles.couplings for name in (c.follower, c.leader)}
+    hand = hand_of(((j.name, above[j.parent], carrier[j.parent]) for j in urdf.moving_joints), soft)
+    depth, beyond = {urdf.root: (0, 0)}, {urdf.root: False}
     for joint in urdf.joints:
         moving, total = depth[joint.parent]
         depth[joint.child] = (moving + joint.moving, total + 1)
-    return max(depth, key=lambda link: depth[link])
+        held = joint.name in urdf.roles.locked and joint.element.get("type") in MOVING
+        beyond[joint.child] = joint.name in hand if joint.moving else held or beyond[joint.parent]
+    own = [link for link in depth if not beyond[link]]
+    return max(own, key=lambda link: depth[link])
+
+
+def _above(urdf: Urdf) -> tuple[dict[str, str], dict[str, str | None]]:
+    """Return by link the first link of its rigid body, and the joint that moves this body."""
+    carrier: dict[str, str] = {urdf.root: urdf.root}
+    above: dict[str, str | None] = {urdf.root: None}
+    for joint in urdf.joints:
+        carrier[joint.child] = joint.child if joint.moving else carrier[joint.parent]
+        above[joint.child] = joint.name if joint.moving else above[joint.parent]
+    return carrier, above

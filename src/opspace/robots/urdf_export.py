@@ -7,6 +7,7 @@ import xml.etree.ElementTree as ET
 import numpy as np
 
 from opspace.robots.urdf import MOMENTS, Urdf
+from opspace.robots.urdf_pose import attribute_floats, rpy_matrix
 
 
 def to_xml(
@@ -59,8 +60,8 @@ def inertia(urdf: Urdf, link: str) -> tuple[float, np.ndarray, np.ndarray]:
     if element is None:
         return 0.0, np.zeros(3), np.zeros((3, 3))
     origin, mass, tensor = (element.find(tag) for tag in ("origin", "mass", "inertia"))
-    xyz = _floats(origin, "xyz")
-    rotation = rpy_matrix(_floats(origin, "rpy"))
+    xyz = attribute_floats(origin, "xyz")
+    rotation = rpy_matrix(attribute_floats(origin, "rpy"))
     entries = tensor.attrib if tensor is not None else {}
     xx, xy, xz, yy, yz, zz = (float(entries.get(key, 0.0)) for key in MOMENTS)
     local = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
@@ -69,27 +70,3 @@ def inertia(urdf: Urdf, link: str) -> tuple[float, np.ndarray, np.ndarray]:
         xyz,
         (rotation @ local @ rotation.T),
     )
-
-
-def rpy_matrix(rpy: np.ndarray) -> np.ndarray:
-    """Return the rotation matrix of URDF's roll, pitch and yaw (fixed axes x, y, z).
-
-    Args:
-        rpy: (3,) angles in rad.
-
-    Returns:
-        (3, 3) rotation matrix.
-    """
-    (cr, cp, cy), (sr, sp, sy) = np.cos(rpy), np.sin(rpy)
-    return np.array(
-        [
-            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
-            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
-            [-sp, cp * sr, cp * cr],
-        ]
-    )
-
-
-def _floats(element: ET.Element | None, key: str) -> np.ndarray:
-    text = element.get(key) if element is not None else None
-    return np.array([float(x) for x in text.split()]) if text else np.zeros(3)

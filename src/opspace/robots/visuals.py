@@ -13,8 +13,10 @@ import numpy as np
 import pinocchio as pin
 
 from opspace.errors import ModelError, missing_extra
+from opspace.robots.adapter import held_joints, spread_of
 from opspace.robots.pinocchio_model import model_from_urdf
 from opspace.robots.protocol import Robot
+from opspace.robots.spread import Spread
 from opspace.robots.urdf import read_urdf
 
 try:
@@ -23,7 +25,7 @@ try:
 except ImportError as error:
     raise missing_extra(error.name or "trimesh", "view") from None
 
-from opspace.robots.mujoco_model import mujoco_model
+from opspace.robots.mujoco_model import model_of
 
 PACKAGE_DEPTH = 8
 """Directories above a URDF file in which its packages are looked for."""
@@ -94,17 +96,19 @@ def visuals_of(robot: Robot) -> Visuals:
     if robot.source is None:
         raise ModelError(f"robot {robot.name!r} was not read from a file that could be shown")
     if robot.source.suffix == ".urdf":
-        found = _UrdfVisuals(robot.source, robot.locked_joints, robot.floating_base)
+        found = _UrdfVisuals(robot.source, robot)
         if found.shapes:
             return found
-    return _MujocoVisuals(mujoco_model(robot.source, robot.floating_base, robot.locked_joints))
+    return _MujocoVisuals(model_of(robot), spread_of(robot))
 
 
 class _UrdfVisuals:
     """Meshes of a URDF, read and placed by Pinocchio."""
 
-    def __init__(self, path: Path, locked: tuple[str, ...], floating_base: bool) -> None:
-        self._model = model_from_urdf(read_urdf(path, locked, floating_base), floating_base)
+    def __init__(self, path: Path, robot: Robot) -> None:
+        free = robot.floating_base
+        self._model = model_from_urdf(read_urdf(path, held_joints(robot), free), free)
+        self._spread = spread_of(robot)
         self._data = self._model.createData()
         directories = [str(parent) for parent in path.resolve().parents[:PACKAGE_DEPTH]]
         try:
@@ -119,6 +123,7 @@ class _UrdfVisuals:
 
     def poses(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """See `Visuals.poses`."""
+        q = q if self._spread is None else self._spread.positions(q)
         pin.forwardKinematics(self._model, self._data, q)
         pin.updateGeometryPlacements(self._model, self._data, self._geometry, self._placed)
         places = [pin.SE3ToXYZQUAT(place) for place in self._placed.oMg]
@@ -129,8 +134,9 @@ class _UrdfVisuals:
 class _MujocoVisuals:
     """Shapes of an MJCF file, or the capsules that stand for a URDF without meshes."""
 
-    def __init__(self, model: mujoco.MjModel) -> None:
+    def __init__(self, model: mujoco.MjModel, spread: Spread | None) -> None:
         self._model, self._data = model, mujoco.MjData(model)
+        self._spread = spread
         planes = (mujoco.mjtGeom.mjGEOM_PLANE, mujoco.mjtGeom.mjGEOM_HFIELD)
         self._shown = [
             g
@@ -143,7 +149,7 @@ class _MujocoVisuals:
 
     def poses(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """See `Visuals.poses`."""
-        self._data.qpos[:] = q
+        self._data.qpos[:] = q if self._spread is None else self._spread.positions(q)
         mujoco.mj_kinematics(self._model, self._data)
         quaternions = np.empty((len(self._shown), 4))
         for quaternion, g in zip(quaternions, self._shown, strict=True):

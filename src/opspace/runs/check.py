@@ -12,7 +12,7 @@ from opspace.controller import Controller
 from opspace.errors import InputError
 from opspace.plan.calibration import BRAKE_RANGE, Calibration
 from opspace.plan.scales import Singularity
-from opspace.robots.adapter import AdapterBase
+from opspace.robots.adapter import AdapterBase, held_joints
 from opspace.robots.joint_units import joint_units
 from opspace.robots.protocol import Robot
 from opspace.stack import Stack
@@ -59,6 +59,9 @@ class RobotCheck:
         dof: Number of velocity coordinates.
         tool: Default tool frame.
         joints: Its joints; those of a floating base are left out.
+        locked: Where joints of the file are held, rad or m; None for those with several
+            coordinates.
+        coupled: Joints that follow others, with the relation.
         sigma: Eigenvalues of J M⁻¹ Jᵀ at the reference posture by task, strongest first, as
             multiples of what is usual in the workspace.
         scale: That mean by task, 1/kg or 1/(kg·m²).
@@ -71,6 +74,8 @@ class RobotCheck:
     dof: int
     tool: str
     joints: tuple[JointReport, ...]
+    locked: dict[str, float | None]
+    coupled: tuple[str, ...]
     sigma: dict[str, tuple[float, ...]]
     scale: dict[str, float]
     buffer: tuple[float, float]
@@ -109,6 +114,8 @@ def check_robot(robot: Robot) -> RobotCheck:
         dof=robot.nv,
         tool=robot.tool,
         joints=joints,
+        locked=dict(held_joints(robot)),
+        coupled=_coupled(robot),
         sigma=sigma,
         scale=scale,
         buffer=(option.lower, option.upper),
@@ -159,6 +166,10 @@ def _joints(robot: Robot, calibration: Calibration | None) -> tuple[JointReport,
 def _of_file(robot: Robot) -> tuple[str, ...]:
     """Return what was found when the file was read; a robot of one's own has none."""
     return robot.description.warnings if isinstance(robot, AdapterBase) else ()
+
+
+def _coupled(robot: Robot) -> tuple[str, ...]:
+    return tuple(map(str, robot.description.couplings)) if isinstance(robot, AdapterBase) else ()
 
 
 def _known(value: float) -> float | None:

@@ -134,10 +134,21 @@ def build_robot(scenario: Scenario) -> Robot:
     """
     try:
         return load_robot(
-            scenario.robot, backend=scenario.backend, floating_base=scenario.floating_base
+            scenario.robot,
+            backend=scenario.backend,
+            floating_base=scenario.floating_base,
+            joints=scenario.joints,
+            locked=scenario.locked,
+            tool=scenario.tool,
         )
     except UnknownNameError as error:
-        raise scenario.error(("robot",), str(error)) from error
+        raise scenario.error((_key_of(scenario, error.name),), str(error)) from error
+
+
+def _key_of(scenario: Scenario, name: str) -> str:
+    """Return the key that gave a name."""
+    named = {"joints": scenario.joints or (), "locked": scenario.locked, "tool": (scenario.tool,)}
+    return next((key for key, names in named.items() if name in names), "robot")
 
 
 def _start(scenario: Scenario, robot: Robot) -> np.ndarray:

@@ -155,6 +155,17 @@ class Scenario(Entry):
         default="pinocchio", description="library that computes the controller's dynamics"
     )
     floating_base: bool = Field(default=False, description="free the root link")
+    joints: list[str] | None = Field(
+        default=None,
+        description='names or patterns ("left_*") of the joints to control; those with a motor '
+        "where not given",
+    )
+    locked: dict[str, Annotated[float, Number("rad or m")]] = Field(
+        default_factory=dict, description="joint, or pattern: position at which to hold it"
+    )
+    tool: str | None = Field(
+        default=None, description="default tool frame; that of the robot where not given"
+    )
     duration: Annotated[float, Number("s", above=0.0, at_most=3600.0)] = Field(
         description="simulated time [s]"
     )

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from opspace.errors import InputError, ModelError, missing_extra
+from opspace.robots.adapter import spread_of
 from opspace.sim.disturbances import NO_DISTURBANCES, Disturbances, Hand, Wire
 
 if TYPE_CHECKING:
@@ -57,12 +58,12 @@ class Plant:
         if not (math.isfinite(dt) and dt > 0.0):
             raise InputError(f"the time step must be above 0 s, got {dt}")
         mujoco = _import_mujoco()
-        from opspace.robots.mujoco_model import mujoco_model  # noqa: PLC0415 - imports mujoco
+        from opspace.robots.mujoco_model import model_of  # noqa: PLC0415 - imports mujoco
 
         if robot.source is None:
             raise ModelError(f"robot {robot.name!r} has no file that a simulator could load")
         self._mujoco = mujoco
-        self.model = mujoco_model(robot.source, robot.floating_base, robot.locked_joints)
+        self.model = model_of(robot)
         self.model.opt.timestep = dt
         # Implicit in the velocity: stable for stiff friction, exact for a frictionless arm to O(dt).
         self.model.opt.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
@@ -77,7 +78,12 @@ class Plant:
         if not friction:
             self.model.dof_damping[:] = 0.0
             self.model.dof_frictionloss[:] = 0.0
-        disturbances.spoil(self.model, robot.torque_limit)
+        spread = self._spread = spread_of(robot)
+        limit = robot.torque_limit
+        if spread is not None:
+            limit = np.zeros(self.model.nv)
+            limit[spread.leaders] = robot.torque_limit
+        disturbances.spoil(self.model, limit)
         self._limit = robot.torque_limit if torque_limits else np.full(robot.nv, np.inf)
         self._robot = robot
         self.adds_gravity = adds_gravity
@@ -89,18 +95,18 @@ class Plant:
         if disturbances.mass_error:
             mujoco.mj_setConst(self.model, self.data)
         start = np.asarray(q, dtype=float)
-        if start.shape != (self.model.nq,) or not np.all(np.isfinite(start)):
+        if start.shape != (robot.nq,) or not np.all(np.isfinite(start)):
             raise InputError(
-                f"the start configuration of {robot.name!r} must be {self.model.nq} finite numbers"
+                f"the start configuration of {robot.name!r} must be {robot.nq} finite numbers"
             )
-        self.data.qpos[:] = start
+        self.data.qpos[:] = start if spread is None else spread.positions(start)
         if v is not None:
             speed = np.asarray(v, dtype=float)
-            if speed.shape != (self.model.nv,) or not np.all(np.isfinite(speed)):
+            if speed.shape != (robot.nv,) or not np.all(np.isfinite(speed)):
                 raise InputError(
-                    f"the start velocity of {robot.name!r} must be {self.model.nv} finite numbers"
+                    f"the start velocity of {robot.name!r} must be {robot.nv} finite numbers"
                 )
-            self.data.qvel[:] = speed
+            self.data.qvel[:] = speed if spread is None else spread.G @ speed
         mujoco.mj_forward(self.model, self.data)
         self.dt = dt
 
@@ -119,12 +125,12 @@ class Plant:
     @property
     def q(self) -> np.ndarray:
         """Configuration, (nq,), a copy."""
-        return np.array(self.data.qpos)
+        return np.array(self._own(self.data.qpos))
 
     @property
     def v(self) -> np.ndarray:
         """Velocity, (n,), rad/s, a copy."""
-        return np.array(self.data.qvel)
+        return np.array(self._own(self.data.qvel))
 
     @property
     def noisy(self) -> bool:
@@ -146,6 +152,14 @@ class Plant:
             self._own_model.update(self.q, self.v)
             asked = asked + self._own_model.gravity
         applied = np.clip(asked, -self._limit, self._limit)
-        push = self._hand.torque(self.t, self.data.qpos, self.data.qvel)
-        self.data.qfrc_applied[:] = applied if push is None else applied + push
+        push = self._hand.torque(self.t, self._own(self.data.qpos), self._own(self.data.qvel))
+        given = applied if push is None else applied + push
+        if self._spread is None:
+            self.data.qfrc_applied[:] = given
+        else:
+            self.data.qfrc_applied[self._spread.leaders] = given
         self._mujoco.mj_step(self.model, self.data)
+
+    def _own(self, values: np.ndarray) -> np.ndarray:
+        """Leave the joints that lead; those that follow belong to the simulation."""
+        return values if self._spread is None else values[self._spread.leaders]

@@ -6,11 +6,12 @@ import contextlib
 import io
 import socket
 import time
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from opspace.errors import InputError, missing_extra
+from opspace.errors import InputError, ModelWarning, missing_extra
 from opspace.record.growing import GrowingRecording
 from opspace.robots import Robot, load_robot
 from opspace.robots.joint_units import effort_unit
@@ -190,7 +191,13 @@ class Page:
 
 
 def _robot(about: dict[str, Any]) -> Robot:
-    found = load_robot(about["file"] or about["name"], floating_base=about["floating_base"])
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ModelWarning)  # who recorded has seen them
+        found = load_robot(
+            about["file"] or about["name"],
+            floating_base=about["floating_base"],
+            locked=about["locked_joints"],
+        )
     if found.nv != len(about["joints"]):
         raise InputError(
             f"robot {found.name!r} has {found.nv} joints now, the recording {len(about['joints'])}"
