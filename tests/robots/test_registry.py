@@ -71,7 +71,7 @@ def test_the_fingers_of_the_panda_are_locked() -> None:
 
 
 def test_names_are_listed_without_the_package(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(catalogue.sysconfig, "get_path", lambda key: "/nowhere")
+    monkeypatch.setattr(sys, "path", ["/nowhere"])
     robots = {robot.name: robot for robot in available_robots()}
     assert robots["puma560"].installed
     assert not robots["panda"].installed

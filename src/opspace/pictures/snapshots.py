@@ -124,7 +124,7 @@ def render(
     # The shadow map must reach beyond what is in view, or its edge speckles the floor.
     model.vis.map.shadowclip, model.vis.quality.shadowsize = 4.0, 8192
     data = mujoco.MjData(model)
-    ticks = [_tick(model, recording, time, task) for time in times]
+    ticks = _ticks(model, recording, times, task)
     view = _choose_view(model, data, ticks, size, direction)
     with canvas(model, size) as drawing:
         for tick in ticks:
@@ -169,9 +169,9 @@ def snapshot_strip(
     gap, font = max(width // 40, 1), ImageFont.load_default(size=max(width // 22, 8))
     below = 2 * max(width // 22, 8)
     strip = Image.new("RGB", (len(images) * (width + gap) - gap, height + below), "white")
-    draw = ImageDraw.Draw(strip)
+    draw, t = ImageDraw.Draw(strip), recording.t
     for i, (image, time) in enumerate(zip(images, times, strict=True)):
-        left, shown = i * (width + gap), recording.t[_index(recording, time)]
+        left, shown = i * (width + gap), t[_nearest(t, time)]
         strip.paste(Image.fromarray(image), (left, 0))
         caption = f"({chr(ord('a') + i)})  t = {shown:.2f} s"
         middle = left + width / 2, height + below / 2
@@ -182,22 +182,38 @@ def snapshot_strip(
     return path
 
 
-def _index(recording: Recording, time: float) -> int:
-    return int(np.abs(recording.t - time).argmin())
+def _nearest(t: np.ndarray, time: float) -> int:
+    return int(np.abs(t - time).argmin())
 
 
-def _tick(model: mujoco.MjModel, recording: Recording, time: float, task: str) -> _Tick:
-    row, qpos = _index(recording, time), np.array(model.qpos0)
-    for start, stop, name in _coordinates(model):
-        single = stop - start == 1
-        qpos[start:stop] = recording[name][row] if single else recording.group(name)[row]
-    tool = np.column_stack([recording[f"tool/{axis}"] for axis in "xyz"])
+def _ticks(
+    model: mujoco.MjModel, recording: Recording, times: Sequence[float], task: str
+) -> list[_Tick]:
+    """Read what is to be seen at each time; whole columns are read once."""
+    coordinates = [
+        (start, stop, _columns(recording, name, stop - start))
+        for start, stop, name in _coordinates(model)
+    ]
     error = [f"tasks/{task}/error/{i}" for i in range(3)]
-    target = None
-    if all(name in recording for name in error):
-        target = tool[row] + [recording[name][row] for name in error]
-    shown = np.linspace(0, row, min(row + 1, _TRAIL_POINTS)).astype(int)
-    return _Tick(qpos, target, tool[shown])
+    aimed = all(name in recording for name in error)
+    t, tool = recording.t, np.column_stack([recording[f"tool/{axis}"] for axis in "xyz"])
+    ticks = []
+    for row in (_nearest(t, time) for time in times):
+        found, qpos = recording.row(row), np.array(model.qpos0)
+        for start, stop, names in coordinates:
+            qpos[start:stop] = [found[name] for name in names]
+        target = tool[row] + [found[name] for name in error] if aimed else None
+        shown = np.linspace(0, row, min(row + 1, _TRAIL_POINTS)).astype(int)
+        ticks.append(_Tick(qpos, target, tool[shown]))
+    return ticks
+
+
+def _columns(recording: Recording, name: str, width: int) -> tuple[str, ...]:
+    if width > 1:
+        return recording.members(name)
+    if name not in recording:
+        raise recording.no_column(name)
+    return (name,)
 
 
 def _coordinates(model: mujoco.MjModel) -> list[tuple[int, int, str]]:

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from opspace.command import LevelStatus, TaskStatus
+from opspace.command import Found, LevelStatus, TaskStatus
 from opspace.kernels.spectrum import spectrum
 from opspace.kernels.walk import slot_bit
 from opspace.plan.memory import reported
@@ -32,6 +32,10 @@ class CompiledReport:
         self._parts: dict[str, np.ndarray] | None = None
         self._tasks: dict[str, TaskStatus] | None = None
         self._levels: tuple[LevelStatus, ...] | None = None
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Be copied as what is told: the plan is of this controller, and its memory of this process."""
+        return Found, (dict(self.tasks), self.levels, dict(self.limits))
 
     @property
     def tasks(self) -> Mapping[str, TaskStatus]:
