@@ -566,16 +566,22 @@ def plot(
         bool, typer.Option("--overlay", help="A panel per column with a line per recording.")
     ] = False,
     out: Annotated[
-        Path | None, typer.Option(help="File to write (.png). [default: FIRST RUN/plot.png]")
+        Path | None,
+        typer.Option(
+            help="File to write (.png, .pdf, .svg). [default: FIRST RUN/plot.png; "
+            "plot-COLUMN.png where columns are named]"
+        ),
     ] = None,
 ) -> None:
     """Draw columns of recordings over time, side by side or over each other."""
-    from opspace.plots import overlay_columns, plot_columns, save
+    from opspace.plots import file_name, overlay_columns, plot_columns, save
     from opspace.record.selection import select
 
     recordings, columns = select(words)
     draw = overlay_columns if overlay else plot_columns
-    path = out or next(iter(recordings.values())).directory / "plot.png"
+    first, *others = recordings
+    name = file_name("plot", [*others, *columns, *(["overlay"] if overlay else [])])
+    path = out or recordings[first].directory / f"{name}.png"
     save(draw(recordings, columns), path)
     print(f"results: {path}")
 
