@@ -81,6 +81,19 @@ def test_names_are_listed_without_the_package(monkeypatch: pytest.MonkeyPatch) -
     assert load_robot("puma560").nv == 6
 
 
+@pytest.mark.parametrize("place", ["user/lib/python3.11/site-packages", "target", "dist-packages"])
+def test_files_are_found_wherever_python_finds_packages(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, place: str
+) -> None:
+    robots = tmp_path / place / "cmeel.prefix/share/example-robot-data/robots"
+    file = robots / catalogue.CATALOGUE["ur5"].file
+    file.parent.mkdir(parents=True)
+    file.write_text(URDF)
+    monkeypatch.setattr(sys, "path", ["/nowhere", str(tmp_path / place)])
+    assert catalogue.locate(catalogue.CATALOGUE["ur5"]) == file
+    assert {robot.name for robot in available_robots() if robot.installed} == {"puma560", "ur5"}
+
+
 def test_listing_robots_imports_no_dynamics_library() -> None:
     code = (
         "import sys; from opspace.robots import available_robots; available_robots();"

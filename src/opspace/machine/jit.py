@@ -96,4 +96,3 @@ def jit(function: Callable[..., Any], *, counted: bool = False, nogil: bool = Fa
 
 def _unliteral(args: Any, kws: dict[str, Any]) -> tuple[Any, dict[str, Any]]:
     return tuple(map(types.unliteral, args)), {k: types.unliteral(kind) for k, kind in kws.items()}
-

@@ -41,7 +41,7 @@ class _Reading(_SourceFileBackedLocatorMixin, _CacheLocator):
 
 
 class _Places(CompileResultCacheImpl):
-    _locator_classes = [*CompileResultCacheImpl._locator_classes, _Reading]
+    _locator_classes = [*CompileResultCacheImpl._locator_classes, _Reading]  # noqa: RUF012
 
 
 class _Cache(FunctionCache):

@@ -99,11 +99,11 @@ def _captioned(image: np.ndarray, time: float, found: Mapping[str, float]) -> Im
     font = ImageFont.load_default(size=12 * k)
     draw.text((8 * k, 6 * k), f"t = {time:.1f} s", fill="#303030", font=font)
     top = 26 * k
-    for column, h in found.items():
+    for column, activation in found.items():
         parts = column.split("/")
         if parts[0] != "tasks" or parts[-1] != "activation":
             continue
-        h = 0.0 if math.isnan(h) else h
+        h = 0.0 if math.isnan(activation) else activation
         bar = (8 * k, top + 2 * k, 48 * k, top + 10 * k)
         draw.rectangle(bar, outline="#8c8c8c", fill="#ffffff")
         if h > 0.0:

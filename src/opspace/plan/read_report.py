@@ -78,9 +78,7 @@ class CompiledReport:
     def _level_status(self) -> tuple[LevelStatus, ...]:
         plan, found = self._plan, self._found()
         shares = found.numbers("share")
-        there = {
-            place[0] for place, share in zip(plan.places, shares, strict=True) if share > 0.0
-        }
+        there = {place[0] for place, share in zip(plan.places, shares, strict=True) if share > 0.0}
         solved = zip(*map(found.numbers, ("scale", "top", "chosen", "width")), strict=True)
         next(solved)  # joint limits are no level
         kept = found["kept"]

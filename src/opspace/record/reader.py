@@ -82,7 +82,12 @@ class Recording:
 
     def __getstate__(self) -> dict[str, Any]:
         """Be pickled with the numbers, so that it can be read where the file is not."""
-        return {**self.__dict__, "data": np.asarray(self.data), "header": dict(self.header), "meta": dict(self.meta)}
+        return {
+            **self.__dict__,
+            "data": np.asarray(self.data),
+            "header": dict(self.header),
+            "meta": dict(self.meta),
+        }
 
     def __contains__(self, name: object) -> bool:
         return name in self._index
