@@ -38,7 +38,7 @@ def empty(tmp_path):
     """Run a program that finds nothing compiled in its first call, what the first left in the next."""
     environment = os.environ | {
         "NUMBA_CACHE_DIR": str(tmp_path / "kept"),
-        "PYTHONPATH": str(tmp_path),
+        "PYTHONPATH": os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")]),
     }
 
     def start(*words):
@@ -108,7 +108,7 @@ caching.IndexDataCacheFile._open_for_write = full
 @pytest.mark.parametrize("error", ["PermissionError()", "OSError(30, 'read-only')"])
 @pytest.mark.parametrize("set_by_user", [True, False])
 def test_who_may_only_read_starts_from_what_others_compiled(empty, tmp_path, error, set_by_user):
-    own = "" if set_by_user else "import numba; numba.config.CACHE_DIR = ''\n"
+    own = "" if set_by_user else "import os; del os.environ['NUMBA_CACHE_DIR']\n"
     (tmp_path / "small.py").write_text(SMALL)
     program = START.format(python=sys.executable)
     first = empty("-c", own + program)

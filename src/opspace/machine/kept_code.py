@@ -20,7 +20,7 @@ from numba.core.caching import (
 log = logging.getLogger("opspace")
 
 
-class _Reading(_SourceFileBackedLocatorMixin, _CacheLocator):
+class _Reading(_SourceFileBackedLocatorMixin, _CacheLocator):  # pyright: ignore[reportIncompatibleMethodOverride]
     """The first place that numba would write to, for a user who may only read there.
 
     Whoever installed may have compiled already; without any place numba refuses the function.
@@ -33,7 +33,7 @@ class _Reading(_SourceFileBackedLocatorMixin, _CacheLocator):
     def ensure_cache_path(self) -> None:
         """Ask for nothing: it need not be there."""
 
-    def get_cache_path(self) -> str:
+    def get_cache_path(self) -> str:  # pyright: ignore[reportIncompatibleMethodOverride]
         """Return the directory that is set, or that beside the source."""
         if directory := getattr(config, "CACHE_DIR", ""):
             return os.path.join(directory, self.get_suitable_cache_subpath(self._py_file))
