@@ -35,6 +35,7 @@ from opspace.robots.mujoco_model import mujoco_model
 __all__ = ["SnapshotUnavailableError", "render", "snapshot_strip", "snapshots"]
 
 SIZE = (480, 420)
+FINE_SHADOWS = 8192
 TARGET_COLOR = (0.87, 0.18, 0.14, 0.75)
 TRAIL_COLOR = (0.0, 0.27, 0.53, 1.0)
 
@@ -96,6 +97,7 @@ def render(
     size: tuple[int, int] = SIZE,
     task: str = "position",
     direction: tuple[float, float] | None = None,
+    shadow_map: int = FINE_SHADOWS,
 ) -> Iterator[np.ndarray]:
     """Render like `snapshots`, one picture after the other, for more than memory would hold.
 
@@ -106,6 +108,8 @@ def render(
         size: See `snapshots`.
         task: See `snapshots`.
         direction: See `snapshots`.
+        shadow_map: Side of the map that shadows are read from, pixels; without a graphics card most
+            of the time goes into it.
 
     Yields:
         (height, width, 3) uint8 image for each time.
@@ -122,7 +126,7 @@ def render(
         raise InputError("a snapshot needs a time and a recording with a tick")
     model = mujoco_model(robot.source, robot.floating_base, robot.locked_joints)
     # The shadow map must reach beyond what is in view, or its edge speckles the floor.
-    model.vis.map.shadowclip, model.vis.quality.shadowsize = 4.0, 8192
+    model.vis.map.shadowclip, model.vis.quality.shadowsize = 4.0, shadow_map
     data = mujoco.MjData(model)
     ticks = _ticks(model, recording, times, task)
     view = _choose_view(model, data, ticks, size, direction)
