@@ -5,13 +5,14 @@ BIN := $(VENV)/bin
 INSTALLED := $(VENV)/.installed
 BENCH := .venv-bench
 
-.PHONY: help test lint docs test-package test-slow test-browser reproduce comparison bench constraints clean
+.PHONY: help test lint docs test-package test-lowest test-slow test-browser reproduce comparison bench constraints clean
 
 help:
 	@echo "make reproduce   the two experiments of the paper: tables and figures in results/"
 	@echo "make test        lint, types, import rules, the documents and the default test suite"
 	@echo "make docs        the documents as a site in results/site, warnings are errors"
 	@echo "make test-package the default suite on the wheel, from the source distribution"
+	@echo "make test-lowest the default suite on the lowest versions that are allowed (PYTHON=python3.10)"
 	@echo "make test-slow   campaigns that take minutes"
 	@echo "make test-browser the viewer in headless Chromium, which must be installed"
 	@echo "make comparison  run other methods on the show-piece; rewrites the tables in the documents"
@@ -50,6 +51,18 @@ test-package: $(INSTALLED)
 	cd results/package/opspace-*/ && $(CURDIR)/$(PACKAGE)/bin/python -c "import opspace; assert 'site-packages' in opspace.__file__, opspace.__file__"
 	cd results/package/opspace-*/ && $(CURDIR)/$(PACKAGE)/bin/python -m pytest -n 2
 
+# Every floor that pyproject.toml declares, at once, with the test tools of today. The wheels of
+# Pinocchio 3 do not say which version of these two libraries they were built for. Old versions warn
+# of what has gone from the new ones: here a warning is no error.
+LOWEST := .venv-lowest
+test-lowest: $(INSTALLED)
+	rm -rf $(LOWEST)
+	$(PYTHON) -m venv $(LOWEST)
+	printf 'cmeel-urdfdom<5\ncmeel-tinyxml2<11\n' > $(LOWEST)/built-for.txt
+	$(BIN)/uv pip compile --quiet --python $(LOWEST)/bin/python --resolution lowest-direct --only-binary :all: --constraints $(LOWEST)/built-for.txt --extra all --no-header --no-annotate --output-file $(LOWEST)/lowest.txt pyproject.toml
+	$(BIN)/uv pip install --quiet --python $(LOWEST)/bin/python --constraints $(LOWEST)/lowest.txt --editable '.[all,docs,test]'
+	NUMBA_CACHE_DIR=$(CURDIR)/$(LOWEST)/kept $(LOWEST)/bin/python -m pytest -n 2 -W default
+
 test-slow: $(INSTALLED)
 	$(BIN)/python -m pytest -m slow
 	OPSPACE_CAMPAIGN=1 $(BIN)/python -m pytest -n 2 tests/law -k continuous
@@ -76,4 +89,4 @@ constraints: $(INSTALLED)
 	$(BIN)/uv pip compile --quiet --universal --upgrade --python-version 3.10 --extra all --extra docs --extra test --no-header --no-annotate --no-emit-index-url --output-file constraints.txt pyproject.toml
 
 clean:
-	rm -rf $(VENV) $(BENCH) $(PACKAGE) results dist build .pytest_cache .ruff_cache .hypothesis
+	rm -rf $(VENV) $(BENCH) $(PACKAGE) $(LOWEST) results dist build .pytest_cache .ruff_cache .hypothesis

@@ -426,8 +426,9 @@ def view(
     what: Annotated[
         str,
         typer.Argument(
-            metavar="SCENARIO|RUN",
-            help="A scenario to run on the page, or the directory of a recording to look at.",
+            metavar="SCENARIO|ROBOT|RUN",
+            help="A scenario to run on the page, a robot (by name or file) to hold and drag there, "
+            "or the directory of a recording to look at.",
         ),
     ],
     overrides: Overrides = None,
@@ -449,15 +450,15 @@ def view(
         typer.Option(help="Directory to record to. [default: results/view/NAME-1, -2, ...]"),
     ] = None,
 ) -> None:
-    """Watch a run in a browser: live, with buttons to change it, or recorded."""
+    """Watch a run in a browser: live, with buttons to change it, or recorded; or just a robot."""
     from opspace.record.format import HEADER
     from opspace.runs.watch import next_directory, watch_scenario
-    from opspace.scenario import load_scenario
+    from opspace.scenario.of_robot import scenario_or_robot
 
     if Path(what).is_dir() or (Path(what) / HEADER).exists():
         _view_recording(Path(what), host, port)
         return
-    loaded = load_scenario(what, overrides or ())
+    loaded = scenario_or_robot(what, overrides or ())
     begins = "now" if start else "when the page is open"
     watch_scenario(
         loaded,
@@ -603,16 +604,22 @@ def plot(
         bool, typer.Option("--overlay", help="A panel per column with a line per recording.")
     ] = False,
     out: Annotated[
-        Path | None, typer.Option(help="File to write (.png). [default: FIRST RUN/plot.png]")
+        Path | None,
+        typer.Option(
+            help="File to write (.png, .pdf, .svg). [default: FIRST RUN/plot.png; "
+            "plot-COLUMN.png where columns are named]"
+        ),
     ] = None,
 ) -> None:
     """Draw columns of recordings over time, side by side or over each other."""
-    from opspace.plots import overlay_columns, plot_columns, save
+    from opspace.plots import file_name, overlay_columns, plot_columns, save
     from opspace.record.selection import select
 
     recordings, columns = select(words)
     draw = overlay_columns if overlay else plot_columns
-    path = out or next(iter(recordings.values())).directory / "plot.png"
+    first, *others = recordings
+    name = file_name("plot", [*others, *columns, *(["overlay"] if overlay else [])])
+    path = out or recordings[first].directory / f"{name}.png"
     save(draw(recordings, columns), path)
     print(f"results: {path}")
 
@@ -622,9 +629,17 @@ def _print_table(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    table = Table(*heads, box=box.HORIZONTALS, show_edge=False, pad_edge=False)
-    for row in rows:
-        table.add_row(*row)
+    from opspace.runs.fit_table import fit_table
+
     # A file or a pipe has no width, and what reads it should find whole rows.
     width = None if sys.stdout.isatty() else _UNBROKEN
-    Console(width=width, markup=False, emoji=False, highlight=False).print(table)
+    console = Console(width=width, markup=False, emoji=False, highlight=False)
+    for number, part in enumerate(fit_table(heads, rows, console.width)):
+        if number:
+            print()
+        table = Table(box=box.HORIZONTALS, show_edge=False, pad_edge=False)
+        for head, columns in zip(part.heads, part.widths, strict=True):
+            table.add_column(head, width=columns, overflow="fold")
+        for row in part.rows:
+            table.add_row(*row)
+        console.print(table)

@@ -139,8 +139,8 @@ def test_plot_draws_columns_of_a_run(capsys, tmp_path, scenario):
     run(capsys, "run", str(scenario), "--out", str(out))
     status, printed, err = run(capsys, "plot", str(out), "tau", "tool/x")
     assert (status, err) == (0, "")
-    assert printed == f"results: {out / 'plot.png'}\n"
-    assert (out / "plot.png").stat().st_size > 10_000
+    assert printed == f"results: {out / 'plot-tau-tool-x.png'}\n"
+    assert (out / "plot-tau-tool-x.png").stat().st_size > 10_000
     assert "did you mean 'tau'" in refused(capsys, "plot", str(out), "tauu")
 
 

@@ -38,7 +38,7 @@ def empty(tmp_path):
     """Run a program that finds nothing compiled in its first call, what the first left in the next."""
     environment = os.environ | {
         "NUMBA_CACHE_DIR": str(tmp_path / "kept"),
-        "PYTHONPATH": str(tmp_path),
+        "PYTHONPATH": os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")]),
     }
 
     def start(*words):
@@ -88,3 +88,50 @@ def test_the_first_run_ever_gives_the_numbers_of_every_later_one(empty, tmp_path
         empty("-c", RUN, "run", "singularity", "--out", str(tmp_path / name))
     first, second = (load(tmp_path / name).data for name in ("first", "second"))
     np.testing.assert_array_equal(first, second)
+
+
+UNWRITABLE = """
+import numba.core.caching as caching
+def refused(*args, **options):
+    raise {error}
+caching.tempfile.TemporaryFile = refused
+caching.IndexDataCacheFile._open_for_write = refused
+"""
+FULL = """
+import errno, numba.core.caching as caching
+def full(*args, **options):
+    raise OSError(errno.ENOSPC, "no space")
+caching.IndexDataCacheFile._open_for_write = full
+"""
+
+
+@pytest.mark.parametrize("error", ["PermissionError()", "OSError(30, 'read-only')"])
+@pytest.mark.parametrize("set_by_user", [True, False])
+def test_who_may_only_read_starts_from_what_others_compiled(empty, tmp_path, error, set_by_user):
+    own = "" if set_by_user else "import os; del os.environ['NUMBA_CACHE_DIR']\n"
+    (tmp_path / "small.py").write_text(SMALL)
+    program = START.format(python=sys.executable)
+    first = empty("-c", own + program)
+    assert first.stdout.split() == ["1", "0"]
+    again = empty("-c", own + UNWRITABLE.format(error=error) + program)
+    assert again.stdout.split() == ["1", "0"]
+    assert not again.stderr
+
+
+def test_where_nothing_can_be_kept_one_line_says_what_to_do(empty, tmp_path):
+    (tmp_path / "small.py").write_text(SMALL)
+    program = UNWRITABLE.format(error="PermissionError()") + START.format(python=sys.executable)
+    for _ in range(2):
+        done = empty("-c", program)
+        assert done.stdout.split() == ["0", "1"]
+        assert "every start" in done.stderr
+        assert done.stderr.count("NUMBA_CACHE_DIR") == 1
+        assert "it is kept" not in done.stderr
+
+
+def test_a_full_disk_stops_nothing(empty, tmp_path):
+    (tmp_path / "small.py").write_text(SMALL)
+    done = empty("-c", FULL + START.format(python=""))
+    assert done.stdout.split() == ["0", "1"]
+    assert "compiled a sum" in done.stderr
+    assert "it is kept" not in done.stderr

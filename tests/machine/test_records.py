@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from opspace.kernels.columns import OPTION_SIZE
 from opspace.machine.field_table import LIVES, WRITERS
 from opspace.machine.jit import UNCOUNTED
-from opspace.plan.memory import Sizes, make_tick, reported
+from opspace.plan.memory import Reported, Sizes, make_tick
 from opspace.plan.records import BOUNDS, INERTIA, SIZES, SPACE, TABLES, TICK
 from opspace.robots import load_robot
 
@@ -132,16 +132,16 @@ def test_one_copy_keeps_all_that_is_reported_and_nothing_else(tasks, rows, more,
     axes = load_robot("puma560").motion_axes()
     tick, memory = make_tick(size, axes, np.ones(6), np.zeros(OPTION_SIZE))
     memory[:] = np.arange(memory.size)
-    found = reported(size, memory.tobytes())
+    found = Reported(size, memory.tobytes())
     kept = 0
     for table, record in ((TICK, tick), (SPACE, tick.space)):
         for field, array in arrays_of(table, record):
             inside = np.shares_memory(array, memory)
             assert inside == (field.lives == "reported" and array.size > 0), field.name
             if field.lives == "reported":
-                np.testing.assert_array_equal(found.pop(field.name), array)
+                np.testing.assert_array_equal(found[field.name], array)
+                assert found.numbers(field.name) == tuple(array.reshape(-1).tolist())
                 kept += array.size
-    assert not found
     assert kept == memory.size
 
 

@@ -73,7 +73,7 @@ def test_the_fingers_of_the_panda_are_locked() -> None:
 
 
 def test_names_are_listed_without_the_package(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(catalogue.sysconfig, "get_path", lambda key: "/nowhere")
+    monkeypatch.setattr(sys, "path", ["/nowhere"])
     robots = {robot.name: robot for robot in available_robots()}
     assert robots["puma560"].installed
     assert not robots["panda"].installed
@@ -81,6 +81,19 @@ def test_names_are_listed_without_the_package(monkeypatch: pytest.MonkeyPatch) -
     with pytest.raises(MissingExtraError, match=r"example-robot-data.*opspace\[robots\]"):
         load_robot("panda")
     assert load_robot("puma560").nv == 6
+
+
+@pytest.mark.parametrize("place", ["user/lib/python3.11/site-packages", "target", "dist-packages"])
+def test_files_are_found_wherever_python_finds_packages(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, place: str
+) -> None:
+    robots = tmp_path / place / "cmeel.prefix/share/example-robot-data/robots"
+    file = robots / catalogue.CATALOGUE["ur5"].file
+    file.parent.mkdir(parents=True)
+    file.write_text(URDF)
+    monkeypatch.setattr(sys, "path", ["/nowhere", str(tmp_path / place)])
+    assert catalogue.locate(catalogue.CATALOGUE["ur5"]) == file
+    assert {robot.name for robot in available_robots() if robot.installed} == {"puma560", "ur5"}
 
 
 def test_listing_robots_imports_no_dynamics_library() -> None:

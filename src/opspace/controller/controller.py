@@ -66,7 +66,7 @@ class Controller(ReferenceController):
 
     Every tick is one call of compiled code, which computes what `ReferenceController` computes; the
     arguments, errors and results are the same. The first controller on a machine compiles it, which
-    takes half a minute to two; later ones read it from the disk.
+    takes one to three minutes; later ones read it from the disk.
 
     Options are fixed when it is built. Robots with joints of several coordinates, and stacks of more
     than some thirty tasks, take the readable form.

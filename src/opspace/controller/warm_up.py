@@ -1,11 +1,10 @@
-"""Have everything compiled before the first tick, and say so when it takes long."""
+"""Have everything compiled before the first tick, and say so where it was not yet."""
 
 from __future__ import annotations
 
 import logging
 import time
 from collections.abc import Callable
-from threading import Timer
 from typing import Any
 
 import numpy as np
@@ -16,7 +15,7 @@ from opspace.kernels.spectrum import spectrum
 from opspace.kernels.tick import tick
 from opspace.machine.compile_apart import Calls, compile_apart
 from opspace.machine.field_table import Record
-from opspace.machine.jit import is_kept
+from opspace.machine.kept_code import can_be_kept, is_kept
 from opspace.machine.record import Handle
 from opspace.plan.memory import Sizes, make_tick
 from opspace.plan.records import REMEMBERED
@@ -27,8 +26,8 @@ from opspace.robots.rigid_model import RigidModel
 
 log = logging.getLogger("opspace")
 
-PATIENCE = 2.0
-"""Reading compiled code from the disk takes less than this, s."""
+ESTIMATE = "one to three minutes"
+"""How long it takes, measured on a shared core: 90 s alone, 170 s beside others."""
 
 
 def compiled_tick() -> float:
@@ -77,7 +76,7 @@ def first_batch() -> list[tuple[Any, tuple[Any, ...]]]:
 
 
 def ready(what: str, calls: Calls) -> float:
-    """Call compiled functions for the first time, and say so when it takes long.
+    """Call compiled functions for the first time, and say so when they must be compiled.
 
     Args:
         what: What they are together, for the announcement.
@@ -87,26 +86,29 @@ def ready(what: str, calls: Calls) -> float:
         How long it took, s.
     """
     start = time.perf_counter()
-    announcement = Timer(PATIENCE, _announce, (what,))
-    announcement.daemon = True
-    announcement.start()
-    try:
-        found = calls()
-        new = not all(is_kept(compiled, arguments) for compiled, arguments in found)
-        if new:
-            compile_apart(calls)
-        for compiled, arguments in found:
-            compiled(*arguments)
-    finally:
-        announcement.cancel()
+    found = calls()
+    new = not _all_kept(found)
+    if new and all(can_be_kept(compiled) for compiled, _ in found):
+        log.warning("compiling %s, once after each installation: %s", what, ESTIMATE)
+        compile_apart(calls)
+    elif new:
+        log.warning(
+            "compiling %s, as every start will: no directory for it can be written, and "
+            "NUMBA_CACHE_DIR may name one; %s",
+            what,
+            ESTIMATE,
+        )
+    for compiled, arguments in found:
+        compiled(*arguments)
     seconds = time.perf_counter() - start
     if new:
-        log.warning("compiled %s in %.0f s; it is kept for the next start", what, seconds)
+        after = "; it is kept for the next start" if _all_kept(found) else ""
+        log.warning("compiled %s in %.0f s%s", what, seconds, after)
     return seconds
 
 
-def _announce(what: str) -> None:
-    log.warning("compiling %s, once after each installation: half a minute to two", what)
+def _all_kept(calls: list[tuple[Any, tuple[Any, ...]]]) -> bool:
+    return all(is_kept(compiled, arguments) for compiled, arguments in calls)
 
 
 def _axes() -> MotionAxes:

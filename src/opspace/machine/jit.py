@@ -8,10 +8,10 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import numba
 from numba import types
-from numba.core.caching import IndexDataCacheFile
 from numba.core.options import DefaultOptions
+
+from opspace.machine.kept_code import compile_and_keep
 
 FAST = {"reassoc", "contract"}
 """Sums may be taken in another order, four at a time; inf and nan stay what they are."""
@@ -79,29 +79,20 @@ def jit(function: Callable[..., Any], *, counted: bool = False, nogil: bool = Fa
         counted: Whether it makes arrays; no compiled function may then call it.
         nogil: Whether other threads of Python may run while it does.
     """
-    options = {} if counted else UNCOUNTED
-    compiled: Any = numba.njit(
-        cache=True, nogil=nogil, error_model="numpy", fastmath=FAST, **options
-    )(function)
+    compiled = compile_and_keep(
+        function,
+        stamp=STAMP,
+        generation=GENERATION,
+        nogil=nogil,
+        error_model="numpy",
+        fastmath=FAST,
+        **({} if counted else UNCOUNTED),
+    )
     # A literal among the arguments would compile everything below once more.
     template = compiled.get_call_template
     compiled.get_call_template = lambda args, kws: template(*_unliteral(args, kws))
-    cache = compiled._cache
-    cache._cache_file = IndexDataCacheFile(
-        cache_path=cache._cache_path,
-        filename_base=f"{cache._impl.filename_base}-{GENERATION}",
-        source_stamp=STAMP,
-    )
     return compiled
 
 
 def _unliteral(args: Any, kws: dict[str, Any]) -> tuple[Any, dict[str, Any]]:
     return tuple(map(types.unliteral, args)), {k: types.unliteral(kind) for k, kind in kws.items()}
-
-
-def is_kept(compiled: Any, arguments: tuple[Any, ...]) -> bool:
-    """Whether the disk holds a function, compiled for arguments of these types on this processor."""
-    cache = compiled._cache
-    signature = tuple(numba.typeof(argument) for argument in arguments)
-    key = cache._index_key(signature, compiled.targetctx.codegen())
-    return key in cache._cache_file._load_index()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -24,6 +24,8 @@ SIZES = {".gif": (360, 320), ".mp4": (720, 640)}
 """Size of the robot's picture by ending of the file: a GIF grows large."""
 FPS = {".gif": 10.0, ".mp4": 30.0}
 """Pictures per second by ending of the file."""
+SHADOWS = 2048
+"""Side of the map of the shadows: a quarter of a snapshot's takes half the time, and moves."""
 BAND = 130
 """Width of the band with the activations beside a picture of the height of a GIF's, pixels."""
 
@@ -72,13 +74,14 @@ def film(
             raise InputError(f"{name} must be finite and above 0, got {value}")
     if not len(recording):
         raise InputError("a film needs a recording with a tick")
-    times = np.arange(recording.t[0], recording.t[-1], speed / fps).tolist()
-    times = times or [float(recording.t[0])]
+    t = recording.t
+    times = np.arange(t[0], t[-1], speed / fps).tolist() or [float(t[0])]
 
     def frames() -> Iterator[Image.Image]:
-        images = render(recording, robot, times, size=size, task=task)
+        images = render(recording, robot, times, size=size, task=task, shadow_map=SHADOWS)
         for done, (image, time) in enumerate(zip(images, times, strict=True), 1):
-            yield _captioned(image, recording, time)
+            row = min(int(np.searchsorted(t, time)), len(t) - 1)
+            yield _captioned(image, time, recording.row(row))
             if progress:
                 progress(done, len(times))
 
@@ -87,7 +90,7 @@ def film(
     return path
 
 
-def _captioned(image: np.ndarray, recording: Recording, time: float) -> Image.Image:
+def _captioned(image: np.ndarray, time: float, found: Mapping[str, float]) -> Image.Image:
     """Put the time, and a bar for the activation of every task, on a band beside the picture."""
     height, width = image.shape[:2]
     k = max(1.0, height / SIZES[".gif"][1])
@@ -97,14 +100,12 @@ def _captioned(image: np.ndarray, recording: Recording, time: float) -> Image.Im
     draw = ImageDraw.Draw(picture)
     font = ImageFont.load_default(size=12 * k)
     draw.text((8 * k, 6 * k), f"t = {time:.1f} s", fill="#303030", font=font)
-    row = min(int(np.searchsorted(recording.t, time)), len(recording) - 1)
     top = 26 * k
-    for column in recording.names:
+    for column, activation in found.items():
         parts = column.split("/")
         if parts[0] != "tasks" or parts[-1] != "activation":
             continue
-        h = recording[column][row]
-        h = 0.0 if np.isnan(h) else float(h)
+        h = 0.0 if math.isnan(activation) else activation
         bar = (8 * k, top + 2 * k, 48 * k, top + 10 * k)
         draw.rectangle(bar, outline="#8c8c8c", fill="#ffffff")
         if h > 0.0:

@@ -37,6 +37,7 @@ from opspace.robots.mujoco_names import joint_names
 __all__ = ["SnapshotUnavailableError", "render", "snapshot_strip", "snapshots"]
 
 SIZE = (480, 420)
+FINE_SHADOWS = 8192
 TARGET_COLOR = (0.87, 0.18, 0.14, 0.75)
 TRAIL_COLOR = (0.0, 0.27, 0.53, 1.0)
 
@@ -98,6 +99,7 @@ def render(
     size: tuple[int, int] = SIZE,
     task: str = "position",
     direction: tuple[float, float] | None = None,
+    shadow_map: int = FINE_SHADOWS,
 ) -> Iterator[np.ndarray]:
     """Render like `snapshots`, one picture after the other, for more than memory would hold.
 
@@ -108,6 +110,8 @@ def render(
         size: See `snapshots`.
         task: See `snapshots`.
         direction: See `snapshots`.
+        shadow_map: Side of the map that shadows are read from, pixels; without a graphics card most
+            of the time goes into it.
 
     Yields:
         (height, width, 3) uint8 image for each time.
@@ -124,9 +128,9 @@ def render(
         raise InputError("a snapshot needs a time and a recording with a tick")
     model = model_of(robot)
     # The shadow map must reach beyond what is in view, or its edge speckles the floor.
-    model.vis.map.shadowclip, model.vis.quality.shadowsize = 4.0, 8192
+    model.vis.map.shadowclip, model.vis.quality.shadowsize = 4.0, shadow_map
     data = mujoco.MjData(model)
-    ticks = [_tick(model, robot, recording, time, task) for time in times]
+    ticks = _ticks(model, robot, recording, times, task)
     view = _choose_view(model, data, ticks, size, direction)
     with canvas(model, size) as drawing:
         for tick in ticks:
@@ -171,9 +175,9 @@ def snapshot_strip(
     gap, font = max(width // 40, 1), ImageFont.load_default(size=max(width // 22, 8))
     below = 2 * max(width // 22, 8)
     strip = Image.new("RGB", (len(images) * (width + gap) - gap, height + below), "white")
-    draw = ImageDraw.Draw(strip)
+    draw, t = ImageDraw.Draw(strip), recording.t
     for i, (image, time) in enumerate(zip(images, times, strict=True)):
-        left, shown = i * (width + gap), recording.t[_index(recording, time)]
+        left, shown = i * (width + gap), t[_nearest(t, time)]
         strip.paste(Image.fromarray(image), (left, 0))
         caption = f"({chr(ord('a') + i)})  t = {shown:.2f} s"
         middle = left + width / 2, height + below / 2
@@ -184,29 +188,41 @@ def snapshot_strip(
     return path
 
 
-def _index(recording: Recording, time: float) -> int:
-    return int(np.abs(recording.t - time).argmin())
+def _nearest(t: np.ndarray, time: float) -> int:
+    return int(np.abs(t - time).argmin())
 
 
-def _tick(
-    model: mujoco.MjModel, robot: Robot, recording: Recording, time: float, task: str
-) -> _Tick:
-    row, spread = _index(recording, time), spread_of(robot)
-    if spread is None:
-        qpos = np.array(model.qpos0)
-        for start, stop, name in _coordinates(model):
-            single = stop - start == 1
-            qpos[start:stop] = recording[name][row] if single else recording.group(name)[row]
-    else:
-        own = [recording[f"q/{name}"][row] for name in robot.joint_names]
-        qpos = spread.positions(np.array(own))
-    tool = np.column_stack([recording[f"tool/{axis}"] for axis in "xyz"])
+def _ticks(
+    model: mujoco.MjModel, robot: Robot, recording: Recording, times: Sequence[float], task: str
+) -> list[_Tick]:
+    """Read what is to be seen at each time; whole columns are read once."""
+    spread = spread_of(robot)
+    coordinates = [
+        (start, stop, _columns(recording, name, stop - start))
+        for start, stop, name in (_coordinates(model) if spread is None else ())
+    ]
     error = [f"tasks/{task}/error/{i}" for i in range(3)]
-    target = None
-    if all(name in recording for name in error):
-        target = tool[row] + [recording[name][row] for name in error]
-    shown = np.linspace(0, row, min(row + 1, _TRAIL_POINTS)).astype(int)
-    return _Tick(qpos, target, tool[shown])
+    aimed = all(name in recording for name in error)
+    t, tool = recording.t, np.column_stack([recording[f"tool/{axis}"] for axis in "xyz"])
+    ticks = []
+    for row in (_nearest(t, time) for time in times):
+        found, qpos = recording.row(row), np.array(model.qpos0)
+        for start, stop, names in coordinates:
+            qpos[start:stop] = [found[name] for name in names]
+        if spread is not None:
+            qpos = spread.positions(np.array([found[f"q/{name}"] for name in robot.joint_names]))
+        target = tool[row] + [found[name] for name in error] if aimed else None
+        shown = np.linspace(0, row, min(row + 1, _TRAIL_POINTS)).astype(int)
+        ticks.append(_Tick(qpos, target, tool[shown]))
+    return ticks
+
+
+def _columns(recording: Recording, name: str, width: int) -> tuple[str, ...]:
+    if width > 1:
+        return recording.members(name)
+    if name not in recording:
+        raise recording.no_column(name)
+    return (name,)
 
 
 def _coordinates(model: mujoco.MjModel) -> list[tuple[int, int, str]]:

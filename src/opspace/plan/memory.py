@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+from struct import unpack_from
 from typing import NamedTuple
 
 import numpy as np
@@ -29,10 +31,42 @@ class Sizes(NamedTuple):
         return {**self._asdict(), "widest": max(self.rows + self.limits, self.n, 1)}
 
 
-def reported(size: Sizes, memory: bytes) -> dict[str, np.ndarray]:
-    """Cut what a tick wrote and a report reads out of a copy of its block."""
-    block, sizes = Block(np.frombuffer(memory)), size.by_name()
-    return {**TICK.reported(sizes, block), **SPACE.reported(sizes, block)}
+class Reported:
+    """What a tick wrote and a report reads, in a copy of its block.
+
+    Args:
+        size: Sizes of the plan.
+        memory: The copy.
+    """
+
+    def __init__(self, size: Sizes, memory: bytes) -> None:
+        self._places = _places(size)
+        self._memory = memory
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        """Cut one array out; a person rarely asks for all of them."""
+        start, count, dtype, shape = self._places[name]
+        found = np.frombuffer(self._memory, dtype, count, start) if count else np.empty(0, dtype)
+        return found if len(shape) == 1 else found.reshape(shape)
+
+    def numbers(self, name: str) -> tuple[float, ...]:
+        """Read one array as plain numbers, which for a few is faster."""
+        start, count, dtype, _ = self._places[name]
+        kind = "q" if dtype is np.int64 else "d"
+        return unpack_from(f"={count}{kind}", self._memory, start)
+
+
+@lru_cache(maxsize=64)
+def _places(size: Sizes) -> dict[str, tuple[int, int, type, tuple[int, ...]]]:
+    """Tell where each array begins in the block, how many numbers it has, of what type and shape."""
+    sizes = size.by_name()
+    block = Block(np.zeros(TICK.reported_size(sizes) + SPACE.reported_size(sizes)))
+    found: dict[str, tuple[int, int, type, tuple[int, ...]]] = {}
+    start = 0
+    for name, part in {**TICK.reported(sizes, block), **SPACE.reported(sizes, block)}.items():
+        found[name] = (start, part.size, part.dtype.type, part.shape)
+        start += part.nbytes
+    return found
 
 
 def make_tick(

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from opspace.command import LevelStatus, TaskStatus
+from opspace.command import Found, LevelStatus, TaskStatus
 from opspace.kernels.spectrum import spectrum
 from opspace.kernels.walk import slot_bit
-from opspace.plan.memory import reported
+from opspace.plan.memory import Reported
 
 if TYPE_CHECKING:
     from opspace.plan.plan import Plan
@@ -29,9 +30,13 @@ class CompiledReport:
     def __init__(self, plan: Plan, memory: bytes) -> None:
         self._plan = plan
         self._memory = memory
-        self._parts: dict[str, np.ndarray] | None = None
+        self._parts: Reported | None = None
         self._tasks: dict[str, TaskStatus] | None = None
         self._levels: tuple[LevelStatus, ...] | None = None
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Be copied as what is told: the plan is of this controller, and its memory of this process."""
+        return Found, (dict(self.tasks), self.levels, dict(self.limits))
 
     @property
     def tasks(self) -> Mapping[str, TaskStatus]:
@@ -53,57 +58,65 @@ class CompiledReport:
         limits = self._plan.limits
         if limits is None:
             return {}
-        found = self._found()["limit_h"].tolist()
+        found = self._found().numbers("limit_h")
         return {side.name: h for side, h in zip(limits.sides, found, strict=True) if h > 0.0}
 
     def _task_status(self) -> dict[str, TaskStatus]:
         plan, found = self._plan, self._found()
         shares: list[dict[float, float]] = [{} for _ in plan.members]
-        for (level, i, _), share in zip(plan.places, found["share"].tolist(), strict=True):
+        for (level, i, _), share in zip(plan.places, found.numbers("share"), strict=True):
             if share > 0.0:
                 shares[i][level] = shares[i].get(level, 0.0) + share
         status: dict[str, TaskStatus] = {}
-        for packed, levels, h in zip(plan.packed, shares, found["h"].tolist(), strict=True):
-            error = found["error"][packed.rows].copy()
-            norm = float(np.sqrt(error @ error))
+        errors = found["error"]
+        for packed, levels, h in zip(plan.packed, shares, found.numbers("h"), strict=True):
+            error = errors[packed.rows].copy()
+            norm = math.sqrt(error @ error)
             status[packed.task.name] = TaskStatus(h, tuple(sorted(levels.items())), error, norm)
         return status
 
     def _level_status(self) -> tuple[LevelStatus, ...]:
         plan, found = self._plan, self._found()
-        there = {
-            place[0]
-            for place, share in zip(plan.places, found["share"].tolist(), strict=True)
-            if share > 0.0
-        }
+        shares = found.numbers("share")
+        there = {place[0] for place, share in zip(plan.places, shares, strict=True) if share > 0.0}
+        solved = zip(*map(found.numbers, ("scale", "top", "chosen", "width")), strict=True)
+        next(solved)  # joint limits are no level
+        kept = found["kept"]
         return tuple(
-            self._level(found, rank, level)
-            for rank, level in enumerate(plan.levels)
+            self._level(shares, kept, depth, level, *one)
+            for depth, (level, one) in enumerate(zip(plan.levels, solved, strict=False), 1)
             if level in there
         )
 
-    def _found(self) -> dict[str, np.ndarray]:
+    def _found(self) -> Reported:
         if self._parts is None:
-            self._parts = reported(self._plan.size, self._memory)
+            self._parts = Reported(self._plan.size, self._memory)
         return self._parts
 
-    def _level(self, found: dict[str, np.ndarray], rank: int, level: float) -> LevelStatus:
+    def _level(
+        self,
+        shares: tuple[float, ...],
+        kept: np.ndarray,
+        depth: int,
+        level: float,
+        scale: float,
+        top: float,
+        chosen: float,
+        width: float,
+    ) -> LevelStatus:
         plan = self._plan
-        depth = rank + 1
-        scale = float(found["scale"][depth])
         here = [s for s, place in enumerate(plan.places) if place[0] == level]
-        if found["top"][depth] <= 0.0:
-            shown = [s for s in here if found["share"][s] > 0.0]
+        if top <= 0.0:
+            shown = [s for s in here if shares[s] > 0.0]
             members = [plan.members[plan.places[s][1]] for s in shown]
             rows = sum(member.task.rows for member in members)
             empty = np.zeros(0)
             names = tuple(member.task.name for member in members)
             return LevelStatus(level, names, empty, empty, np.zeros((rows, 0)), scale)
-        chosen = int(found["chosen"][depth])
-        present = [s for s in here if chosen & slot_bit.py_func(s)]
+        present = [s for s in here if int(chosen) & slot_bit.py_func(s)]
         packed = [plan.packed[plan.places[s][1]] for s in present]
         first, rows = int(plan.first_kept[depth]), sum(p.task.rows for p in packed)
-        B = found["kept"][first : first + rows, : int(found["width"][depth])]
+        B = kept[first : first + rows, : int(width)]
         sigma, activation, directions = spectrum(np.array(B), plan.tick.option)
         names = tuple(p.task.name for p in packed)
         return LevelStatus(level, names, sigma, activation, directions, scale)

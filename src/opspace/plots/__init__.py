@@ -12,4 +12,5 @@ from opspace.plots.overview import overview_figure as overview_figure
 from opspace.plots.plot_columns import overlay_columns as overlay_columns
 from opspace.plots.plot_columns import plot_columns as plot_columns
 from opspace.plots.singular_directions_plot import singularity_figures as singularity_figures
+from opspace.plots.style import file_name as file_name
 from opspace.plots.style import save as save

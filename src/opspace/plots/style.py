@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import hashlib
+import re
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
+from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import to_hex, to_rgb
@@ -18,10 +21,19 @@ WIDTH = 9.0
 """Width of a figure [in]: 1350 pixels, for a page that shows it 900 wide."""
 
 DPI = 150
+FORMATS: Mapping[str, dict[str, Any]] = MappingProxyType(
+    {
+        ".png": {"Software": None},
+        ".pdf": {"CreationDate": None},
+        ".svg": {"Date": None},
+    }
+)
+"""What a figure can be written as, by the ending of its file, without what changes with every run."""
 TEXT_SIZE = 10.5
 SMALL = 9.5
 INK, FAINT, GRID, BAND = "#303030", "#8c8c8c", "#e8e8e8", "#eaf1f5"
 LINE = 1.6
+_LONGEST = 80
 
 # Paul Tol's high-contrast scheme: told apart under colour blindness and in grey.
 VARIANT_COLORS: Mapping[str, str] = MappingProxyType(
@@ -102,25 +114,44 @@ def dress(axes: Axes, *, title: str = "", x: str = "", y: str = "") -> None:
     axes.set_ylabel(y, fontsize=TEXT_SIZE, color=INK)
 
 
+def file_name(kind: str, shown: Sequence[str]) -> str:
+    """Name the file of a figure by what it shows, so that two figures do not meet in one file.
+
+    Args:
+        kind: What the name begins with.
+        shown: What is to be seen; nothing for what is always shown.
+
+    Returns:
+        The name without an ending.
+    """
+    name = re.sub(r"[^\w.-]+", "-", "-".join([kind, *shown]))
+    if len(name) <= _LONGEST:
+        return name
+    return f"{name[:_LONGEST]}-{hashlib.sha256(name.encode()).hexdigest()[:8]}"
+
+
 def save(figure: Figure, path: Path | str) -> Path:
     """Write a figure; the same figure gives the same bytes.
 
     Args:
         figure: The figure.
-        path: File to write, ending in .png.
+        path: File to write, ending in .png, .pdf or .svg.
 
     Returns:
         The path.
 
     Raises:
-        InputError: The file does not end in .png or cannot be written.
+        InputError: The file has another ending or cannot be written.
     """
     path = Path(path)
-    if path.suffix != ".png":
-        raise InputError(f"{path}: a figure is a .png file")
+    ending = path.suffix.lower()
+    if ending not in FORMATS:
+        raise InputError(f"{path}: a figure ends in {', '.join(FORMATS)}")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        figure.savefig(path, dpi=DPI, metadata={"Software": None})
+        # Names inside an SVG are drawn at random but for this; restored at once.
+        with rc_context({"svg.hashsalt": "opspace"}):
+            figure.savefig(path, format=ending[1:], dpi=DPI, metadata=FORMATS[ending])
     except OSError as error:
         raise InputError(f"{path}: cannot be written: {error.strerror}") from None
     return path

@@ -18,9 +18,13 @@ from opspace.errors import (
     unknown_name,
 )
 from opspace.record import format as fmt
+from opspace.record.pick_columns import pick_columns
 
 if TYPE_CHECKING:
     import pandas as pd
+
+LARGE = 64 * 2**20
+"""Size of a recording's numbers beyond which they stay on the disk until they are asked for, bytes."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -33,7 +37,8 @@ class Recording:
         header: Everything in ``header.json``: ``scenario``, ``seed``, ``versions``, ...
         meta: When and where it was recorded.
         ended: How the run ended.
-        data: (T, number of columns) read-only.
+        data: (T, number of columns) read-only; beyond `LARGE` a map of the file, which then must
+            stay as it is.
     """
 
     directory: Path
@@ -75,6 +80,15 @@ class Recording:
     def __len__(self) -> int:
         return len(self.data)
 
+    def __getstate__(self) -> dict[str, Any]:
+        """Be pickled with the numbers, so that it can be read where the file is not."""
+        return {
+            **self.__dict__,
+            "data": np.asarray(self.data),
+            "header": dict(self.header),
+            "meta": dict(self.meta),
+        }
+
     def __contains__(self, name: object) -> bool:
         return name in self._index
 
@@ -85,15 +99,31 @@ class Recording:
             name: Column name, for example ``q/joint1``.
 
         Returns:
-            (T,) read-only view.
+            (T,) read-only; a view, or of a recording beyond `LARGE` a copy.
 
         Raises:
             UnknownNameError: There is no such column.
         """
         try:
-            return self.data[:, self._index[name]]
+            place = self._index[name]
         except KeyError:
             raise unknown_name(f"column of {self.directory}", name, self.names) from None
+        if not isinstance(self.data, np.memmap):
+            return self.data[:, place]
+        column = pick_columns(self.data, [place])[:, 0]
+        column.setflags(write=False)
+        return column
+
+    def row(self, index: int) -> dict[str, float]:
+        """Read one tick.
+
+        Args:
+            index: Its number; negative ones count from the end.
+
+        Returns:
+            What was recorded, by column name.
+        """
+        return dict(zip(self._index, self.data[index].tolist(), strict=True))
 
     def members(self, prefix: str) -> tuple[str, ...]:
         """List the columns of a group.
@@ -124,7 +154,7 @@ class Recording:
         Raises:
             UnknownNameError: No column lies in such a group.
         """
-        return self.data[:, [self._index[name] for name in self.members(prefix)]]
+        return pick_columns(self.data, [self._index[name] for name in self.members(prefix)])
 
     def no_column(self, name: str, kind: str = "column") -> UnknownNameError:
         """Build the error for what is neither a column nor a group, listing groups before columns.
@@ -158,7 +188,7 @@ class Recording:
             raise missing_extra("pandas", "export") from None
         index = pd.Index(self.t.copy(), name=f"t [{self.units['t']}]")
         names = [name for name in self.names if name != "t"]
-        values = self.data[:, [self._index[name] for name in names]]
+        values = pick_columns(self.data, [self._index[name] for name in names])
         frame = pd.DataFrame(values, index=index, columns=pd.Index(names, dtype=object))
         frame.attrs["units"] = {name: self.units[name] for name in names}
         return frame
@@ -237,12 +267,15 @@ def _columns(path: Path, header: Mapping[str, Any]) -> tuple[fmt.Column, ...]:
 
 def _read_data(path: Path, width: int) -> np.ndarray:
     try:
+        size = path.stat().st_size
+        shape = (size // (width * np.dtype(fmt.DTYPE).itemsize), width)
+        if size > LARGE:
+            return np.memmap(path, fmt.DTYPE, "r", shape=shape)
+        # Made from bytes, the array is read-only.
         content = path.read_bytes()
-    except OSError as error:
-        raise RecordingError(f"{path} cannot be read: {error.strerror}") from error
-    rows = len(content) // (width * np.dtype(fmt.DTYPE).itemsize)
-    # Made from bytes, the array is read-only.
-    return np.frombuffer(content, dtype=fmt.DTYPE, count=rows * width).reshape(rows, width)
+    except (OSError, ValueError) as error:
+        raise RecordingError(f"{path} cannot be read: {error}") from error
+    return np.frombuffer(content, dtype=fmt.DTYPE, count=shape[0] * width).reshape(shape)
 
 
 def _read_end(path: Path, rows: int) -> fmt.End:

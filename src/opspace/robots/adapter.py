@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -26,6 +26,9 @@ class AdapterBase(ABC):
     Every array handed out is read-only; ``q``, ``v``, ``M`` and ``bias`` are views that the next
     update overwrites, or the next question after `place`.
     """
+
+    _model: Any
+    """What the library computes with; a copy of the robot has a copy of it."""
 
     def __init__(self, description: Description) -> None:
         """Take over names, limits and postures.
@@ -75,6 +78,13 @@ class AdapterBase(ABC):
             f"{type(self).__name__}({self.name!r}{base}, {self.nv} joints: {', '.join(names)}; "
             f"tool {self.tool!r})"
         )
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Be copied as model and state; the memory that compiled code reads stays behind."""
+        return type(self), (self.description, self._model), (self.q.copy(), self.v.copy())
+
+    def __setstate__(self, state: tuple[np.ndarray, np.ndarray]) -> None:
+        self.update(*state)
 
     @property
     def q(self) -> np.ndarray:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import sysconfig
+import sys
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -55,7 +55,8 @@ def locate(entry: CatalogueEntry) -> Path | None:
     if entry.package == SHIPPED:
         directories = [Path(__file__).parent / "models"]
     else:
-        roots = dict.fromkeys(sysconfig.get_path(key) for key in ("purelib", "platlib"))
+        # Wherever Python finds packages: an environment's own, a user's, the system's, PYTHONPATH.
+        roots = [entry for entry in sys.path if isinstance(entry, str)]
         below = Path("cmeel.prefix", "share", PACKAGE, "robots")
         directories = [Path(root) / below for root in roots]
     paths = (directory / entry.file for directory in directories)

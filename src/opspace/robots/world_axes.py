@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any
-
-import numba
-
-jit: Any = numba.njit(cache=True)
+from opspace.machine.kept_code import compile_and_keep
 
 
-@jit
+@compile_and_keep
 def world_axes(cdof, origins, com, axes):
     """Bring motion axes about the centre of mass of each tree to the world's origin.
 
@@ -28,7 +24,7 @@ def world_axes(cdof, origins, com, axes):
         axes[j, 3], axes[j, 4], axes[j, 5] = a, b, c
 
 
-@jit
+@compile_and_keep
 def placements(first, xmat, xpos, placement):
     """Write rotations (by columns) and positions into the rows from ``first`` on."""
     for i in range(xpos.shape[0]):

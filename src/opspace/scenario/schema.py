@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import Field, PrivateAttr, ValidationInfo, field_validator, model_validator
 
@@ -240,6 +240,10 @@ class Scenario(Entry):
             check_events(events, info.data["tasks"])
         return events
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Be pickled as plain values; the classes of entries are made and have no place of their own."""
+        return _again, (self.model_dump(mode="json"), self._origin)
+
     def read_from(self, document: Document) -> Self:
         """Remember the document that this was read from, for ``error``."""
         self._origin = Origin(document)
@@ -259,3 +263,9 @@ class Scenario(Entry):
         if document is None:
             return ScenarioError(message, key=key_text(key))
         return document.error(key, message)
+
+
+def _again(data: dict[str, Any], origin: Origin) -> Scenario:
+    scenario = Scenario.model_validate(data)
+    scenario._origin = origin
+    return scenario

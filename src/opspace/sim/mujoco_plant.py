@@ -117,6 +117,13 @@ class Plant:
             f"fastest joint {fastest:.3g} rad/s)"
         )
 
+    def __getstate__(self) -> dict[str, Any]:
+        """Be copied with model and state; a module is not what can be."""
+        return {name: value for name, value in self.__dict__.items() if name != "_mujoco"}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state, _mujoco=_import_mujoco())
+
     @property
     def t(self) -> float:
         """Simulated time, s."""
