@@ -83,9 +83,11 @@ class Batch:
             InputError: A reference or activation gave unusable numbers.
         """
         own = self._own_activations(Q, V, t)
+        first = self._plans[0]
+        first.go_on_from(before, first.members)
         for plan in self._plans:
             plan.refresh(self.robot, t)
-        remembered = _remembered(self._plans[0], before)
+        remembered = _remembered(first)
         tau = np.zeros(Q.shape)
         chunks = iter(range(0, len(Q), CHUNK))
 
@@ -198,10 +200,9 @@ def check_members(members: tuple[Member, ...]) -> None:
             )
 
 
-def _remembered(plan: Plan, before: Plan | None) -> Handle:
-    """Return what the plan before leaves to this one."""
+def _remembered(plan: Plan) -> Handle:
+    """Return what a plan knows of the tick before."""
     tick = plan.tick
-    plan.go_on_from(before, plan.members)
     found = {
         "group": tick.group.copy(),
         "remembers": tick.kind[:, REMEMBERS].copy(),

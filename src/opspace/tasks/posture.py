@@ -14,6 +14,7 @@ from opspace.tasks.references.sample import Reference, Sample
 from opspace.tasks.task import TaskTerms
 from opspace.tasks.tracking import Target, TrackingTask
 from opspace.tasks.validation import Array, finite_array
+from opspace.tasks.way_round import JointTurns
 
 if TYPE_CHECKING:
     from opspace.robots.protocol import Robot
@@ -23,8 +24,10 @@ class PostureTask(TrackingTask):
     """Moves joints to a posture: f* = a_d + kv (v_d − v) + kp (q_d ⊖ q) on the selected rows.
 
     J is the selected rows of the identity, so the drift is zero. q_d ⊖ q is the robot's
-    ``difference``. A floating base is left alone unless its coordinates are named. Once bound,
-    ``target`` reads back as the entries of q that belong to the selected joints.
+    ``difference``; of a joint that turns without end (a hinge without limits) whole turns are left
+    out of it, so that an encoder may wrap and a target may be beyond π. A floating base is left alone
+    unless its coordinates are named. Once bound, ``target`` reads back as the entries of q that belong
+    to the selected joints.
 
     Args:
         target: Whole configuration (nq,), or one value for each selected joint (m,), in rad (m
@@ -38,6 +41,7 @@ class PostureTask(TrackingTask):
 
     Attributes:
         layout: The joints in the robot's coordinates; None before the task is bound.
+        turn: Which way round joints that turn without end went.
 
     Raises:
         InputError: A gain, target or list of joints that cannot be used.
@@ -60,6 +64,7 @@ class PostureTask(TrackingTask):
         )
         self._joints = None if joints is None else tuple(joints)
         self.layout: Layout | None = None
+        self.turn = JointTurns()
         self.target = target
 
     def evaluate(self, robot: Robot, t: float) -> TaskTerms:
@@ -72,6 +77,9 @@ class PostureTask(TrackingTask):
         q_desired = q.copy()
         q_desired[layout.entries] = desired.x
         error = robot.difference(q, q_desired)[layout.coordinates]
+        if layout.endless.any():
+            self.turn.follow(q_desired[layout.entries])
+            error = self.turn(error, layout.endless)
         velocity_error = desired.v - robot.v[layout.coordinates]
         return TaskTerms(
             J=layout.J,
@@ -79,6 +87,11 @@ class PostureTask(TrackingTask):
             acceleration=self._gains.acceleration(error, velocity_error, desired.a),
             error=error,
         )
+
+    def reset(self) -> None:
+        """Forget the held start value and which way round joints that turn without end went."""
+        super().reset()
+        self.turn.reset()
 
     def desired(self, robot: Robot, t: float) -> Sample:
         """See `TrackingTask.desired`."""
