@@ -121,6 +121,15 @@ class Task(KnownAttributes, ABC):
     def reset(self) -> None:
         """Forget what was remembered from earlier ticks, such as a held start value."""
 
+    def resume(self, pause: float) -> None:
+        """Go on after a pause, in which anything may have happened to the robot.
+
+        Args:
+            pause: How long it was, s.
+        """
+        del pause
+        self.reset()
+
     def row_axes(self, robot: Robot) -> Array | None:
         """Return the motion in world axes that each row is about, to be drawn.
 

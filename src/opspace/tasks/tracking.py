@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from opspace.errors import InputError, UnknownNameError
-from opspace.tasks.references.sample import Reference, Sample
+from opspace.tasks.references.sample import Constant, Reference, Sample
+from opspace.tasks.references.start import begun
 from opspace.tasks.rotation import quaternion_from_matrix
 from opspace.tasks.task import Task, TaskTerms
 from opspace.tasks.validation import Array, brief, finite_array, shown
@@ -39,6 +40,21 @@ class Target:
     acceleration: Array
 
 
+@dataclass(frozen=True)
+class Followed:
+    """A reference on its way.
+
+    Attributes:
+        target: The target that it belongs to; another one ends it.
+        reference: The reference, begun.
+        pauses: How long it has stood still so far, s.
+    """
+
+    target: Target
+    reference: Reference
+    pauses: float = 0.0
+
+
 class TrackingTask(Task):
     """Base class of tasks with a target.
 
@@ -62,6 +78,7 @@ class TrackingTask(Task):
         self._robot: Robot | None = None
         self._motion_size = motion_size
         self._held: tuple[Hold, Array] | None = None
+        self._followed: Followed | None = None
         self._target = Target(Hold(), self._vector(None, ""), self._vector(None, ""))
 
     def bind(self, robot: Robot) -> None:
@@ -73,7 +90,15 @@ class TrackingTask(Task):
         except UnknownNameError as error:
             raise error.reworded(f"task {self.name!r}: {error}") from None
         self._robot = robot
+        self._followed = None
         self.reset()
+
+    def resume(self, pause: float) -> None:
+        """See `Task.resume`; a reference goes on where it was, and what is held is found anew."""
+        super().resume(pause)
+        followed = self._followed
+        if followed is not None:
+            self._followed = replace(followed, pauses=followed.pauses + pause)
 
     def reset(self) -> None:
         """Forget the held start value; the next tick finds a new one."""
@@ -84,7 +109,8 @@ class TrackingTask(Task):
         """Target value, reference in time (t ↦ Sample), or None to hold the value found next.
 
         May be assigned at any time, also from another thread; it is checked at once and followed
-        from the next tick on. A reference brings its own velocity and acceleration and clears
+        from the next tick on. A reference without a start time begins at the first tick that follows
+        it; assigned again, it begins again. It brings its own velocity and acceleration and clears
         ``target_velocity`` and ``target_acceleration``; a value leaves them as they are.
         """
         goal = self._target.goal
@@ -93,6 +119,8 @@ class TrackingTask(Task):
     @target.setter
     def target(self, value: ArrayLike | Reference | None) -> None:
         if callable(value):
+            if isinstance(value, Constant):
+                self._goal(value.value)
             rest = self._vector(None, "")
             self._target = Target(value, rest, rest)
         else:
@@ -184,18 +212,21 @@ class TrackingTask(Task):
                 held = self._held = (goal, current().copy())
             goal = held[1]
         elif callable(goal):
-            return self._sampled(goal, t)
+            return self._sampled(target, goal, t)
         return Sample(goal, target.velocity, target.acceleration)
 
-    def _sampled(self, reference: Reference, t: float) -> Sample:
+    def _sampled(self, target: Target, reference: Reference, t: float) -> Sample:
         what = f"task {self.name!r}: reference at t = {t:.6g} s:"
-        sample = reference(t)
+        followed = self._followed
+        if followed is None or followed.target is not target:
+            followed = self._followed = Followed(target, begun(reference, t))
+        sample = followed.reference(t - followed.pauses)
         if not isinstance(sample, tuple) or len(sample) != 3:
             raise InputError(f"{what} must give a Sample(x, v, a), not {shown(sample)}")
         return Sample(
             self._check_value(sample[0], f"{what} x"),
-            self._vector(sample[1], f"{what} v"),
-            self._vector(sample[2], f"{what} a"),
+            self._vector(sample[1] if np.size(sample[1]) else None, f"{what} v"),
+            self._vector(sample[2] if np.size(sample[2]) else None, f"{what} a"),
         )
 
     def _terms(
