@@ -132,7 +132,8 @@ class ReferenceController:
         """Begin at the torque that is on the robot, and move to the controller's own.
 
         The next tick answers ``tau``; see `opspace.controller.handover.Handover`. Called again, or
-        after `hand_back`, it begins anew.
+        after `hand_back`, it begins anew. It is a `restart`: somebody else may have moved the robot
+        meanwhile, and the controller holds it where it finds it.
 
         Args:
             tau: (n,) torque that is on the robot now, N·m.
@@ -142,6 +143,26 @@ class ReferenceController:
             InputError: A torque of another size or not finite, or a duration that is none.
         """
         self._handover = Handover(self._joint_torque(tau), duration, back=False)
+        self.restart()
+
+    def restart(self) -> None:
+        """Go on at the next tick as if no time had passed since the last, wherever the robot is now.
+
+        After a stop, with a clock that went on or began anew: tasks without a target hold what they
+        find, references and transitions go on from where they were, what waits for its time waits on,
+        angles take the short way, and the tick is neither late nor a jump in time. A target that is a
+        value stays what it is; give another one where the robot should not go there. Times that are
+        given from now on are those of the clock after the pause. From any thread, between two ticks.
+        """
+        if self._timing is not None:
+            self._timing.forget()
+        self._begin_anew()
+
+    def _begin_anew(self) -> None:
+        """Let the next tick depend on nothing that the robot did before it."""
+        if self._observer is not None:
+            self._observer.forget_last()
+        self.stack.resume()
 
     def hand_back(self, tau: ArrayLike, duration: float = 0.5) -> None:
         """Move from the controller's torque to the one that takes over, and stay there.
@@ -210,6 +231,7 @@ class ReferenceController:
         robot.update(numbers(q, "q"), numbers(v, "v"))
         timing = Status.OK if self._timing is None else self._timing.check(t, robot.q, robot.v)
         if timing & Status.TIME_JUMP and self._holds:
+            self._begin_anew()
             return self._hold(t, timing)
         return self._answer(t, self.stack.begin_tick(t), timing)
 
