@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,6 +12,7 @@ from opspace.command import Command, Found, Status
 from opspace.controller.disturbance import DisturbanceObserver
 from opspace.controller.drivable import check_drivable
 from opspace.controller.handover import Handover
+from opspace.controller.rates import check_damping, check_limits, with_period
 from opspace.controller.stages import Given, Law, Rules, sum_of_hard_torques, tick
 from opspace.controller.watchdog import Watchdog
 from opspace.errors import InputError, unknown_name
@@ -19,7 +20,7 @@ from opspace.law import Profile
 from opspace.plan.scales import DEFAULT_SINGULARITY, Scales, Singularity
 from opspace.robots.protocol import Robot
 from opspace.stack import Blending, Member, Stack
-from opspace.tasks import JointLimits
+from opspace.tasks import JointLimits, Task
 from opspace.tasks.validation import finite, numbers
 
 BIASES = ("joint", "task")
@@ -51,14 +52,16 @@ class ReferenceController:
             with in case of a fault. Unused where a posture task covers every joint.
         torque_limits: What happens to a torque above the motors' limits, see `TORQUE_LIMITS`.
         period: Time between two ticks, s, if ticks and states shall be watched: late, jumping and stale
-            ones are then reported in the status. None watches nothing.
+            ones are then reported in the status, and joint limits and gains that need more frequent
+            ticks refused. None watches nothing.
         on_time_jump: What happens when time runs backwards or jumps, see
             `opspace.controller.watchdog.POLICIES`; it needs ``period``.
         law: Torque of task sets, to compare with the library's own; see
             `opspace.controller.stages.Question` for what it is asked.
 
     Raises:
-        InputError: The robot is not fully actuated, or an option cannot be used.
+        InputError: The robot is not fully actuated, or an option cannot be used; the joint limits or
+            the damping of a task need a shorter ``period``.
         UnknownNameError: A task names a frame or joint that the robot does not have.
     """
 
@@ -103,7 +106,7 @@ class ReferenceController:
             raise InputError(f"on_time_jump={on_time_jump!r} needs the period of the ticks")
         self._timing = None if period is None else Watchdog(period, on_time_jump)
         self._scales = Scales(robot, singularity)
-        stack.attach(self._scales.prepare)
+        stack.attach(self._scales.prepare if period is None else self._paced(period))
         self.calibration = self._scales.calibration(list(stack))
         if stack.limits is not None:
             stack.limits.bind(robot, self.calibration.brake)
@@ -119,6 +122,13 @@ class ReferenceController:
             stack.limits,
             self._observer,
         )
+
+    def _paced(self, period: float) -> Callable[[Task], None]:
+        """Check the rates of everything that is there now, and of every task that is prepared later."""
+        if self._stack.limits is not None:
+            check_limits(period, self._stack.limits)
+        check_damping(period, self.damping, "damping =")
+        return with_period(self._scales.prepare, period)
 
     def __repr__(self) -> str:
         handled = "off" if self.singularity is None else repr(self.singularity)
