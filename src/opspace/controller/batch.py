@@ -85,8 +85,7 @@ class Batch:
         own = self._own_activations(Q, V, t)
         first = self._plans[0]
         first.go_on_from(before, first.members)
-        for plan in self._plans:
-            plan.refresh(self.robot, t)
+        self._refresh(t)
         remembered = _remembered(first)
         tau = np.zeros(Q.shape)
         chunks = iter(range(0, len(Q), CHUNK))
@@ -103,6 +102,15 @@ class Batch:
             with ThreadPoolExecutor(len(used)) as pool:  # a kept one would not live in a fork
                 list(pool.map(work, used))
         return tau
+
+    def _refresh(self, t: float) -> None:
+        """Bring all plans up to date, without beginning for the tasks what they have not begun."""
+        tasks = [m.task for m in self.members if isinstance(m.task, TrackingTask)]
+        progress = [task.progress for task in tasks]
+        for plan in self._plans:
+            plan.refresh(self.robot, t)
+        for task, before in zip(tasks, progress, strict=True):
+            task.recall(before)
 
     def _own_activations(self, Q: np.ndarray, V: np.ndarray, t: float) -> np.ndarray:
         """Evaluate the activations that users gave to tasks, in Python, state by state."""

@@ -269,7 +269,7 @@ class Packed:
             if held is None or held[0] is not goal:
                 return
             goal = held[1]
-        elif callable(goal):
+        elif callable(goal) or task._gains.max_acceleration is not None:
             return
         sample = Sample(goal, target.velocity, target.acceleration)
         self._write(sample, target, held, task._gains)
@@ -282,6 +282,7 @@ class Packed:
         gains = task._gains
         desired = task.desired(robot, t)
         self._write(desired, target, task._held, gains)
+        self._timed = task.moves(t)
 
     def _write(self, desired: Any, target: Any, held: object, gains: Any) -> None:
         tick, rows = self._tick, self.rows
@@ -301,7 +302,6 @@ class Packed:
         if before is not None and way is not None and way.jumps(before, self._turning):
             self.forget()
         self.target, self.held, self.gains = target, held, gains
-        self._timed = callable(target.goal)
 
     def _pack_goal(self, desired: Any) -> None:
         number, quantity = self._tick.numbers[self.index], self._tick.kind[self.index, QUANTITY]

@@ -26,6 +26,8 @@ class JointTask(PostureTask):
         kp: Stiffness, 1/s².
         kv: Damping, 1/s; None is critical, 2 sqrt(kp).
         max_speed: Speed that the error may ask for, rad/s or m/s.
+        max_acceleration: Acceleration of the way to a new target, rad/s² or m/s²; see
+            `TrackingTask.max_acceleration`.
         name: Name of the task; None is the name of the joint.
 
     Raises:
@@ -40,6 +42,7 @@ class JointTask(PostureTask):
         kp: float = 100.0,
         kv: float | None = None,
         max_speed: float | None = None,
+        max_acceleration: float | None = None,
         name: str | None = None,
     ) -> None:
         super().__init__(
@@ -48,6 +51,7 @@ class JointTask(PostureTask):
             kv=kv,
             joints=[joint],
             max_speed=max_speed,
+            max_acceleration=max_acceleration,
             name=joint if name is None else name,
         )
 

@@ -16,6 +16,7 @@ from opspace.tasks.rotation import cross
 from opspace.tasks.task import TaskTerms
 from opspace.tasks.tracking import TrackingTask
 from opspace.tasks.validation import Array
+from opspace.tasks.ways import Way
 
 if TYPE_CHECKING:
     from opspace.robots.protocol import Robot
@@ -54,6 +55,7 @@ class MotionTask(TrackingTask):
         kp: ArrayLike,
         kv: ArrayLike | None,
         max_speed: float | Sequence[float] | None,
+        max_acceleration: float | Sequence[float] | None = None,
     ) -> None:
         if axes_frame not in ("world", "tool"):
             raise InputError(
@@ -68,6 +70,7 @@ class MotionTask(TrackingTask):
             kp=kp,
             kv=kv,
             max_speed=max_speed,
+            max_acceleration=max_acceleration,
         )
         self.source = source
         self.quantity = quantity
@@ -120,6 +123,10 @@ class MotionTask(TrackingTask):
 
     def _resolve(self, robot: Robot) -> None:
         self.source.bind(robot)
+
+    def _way(self, now: Sample, goal: Array, t: float) -> Way:
+        groups = range(len(self._speed_groups))
+        return self.quantity.way(now, goal, t, [self._pace(group) for group in groups])
 
     def _check_value(self, value: ArrayLike, what: str) -> Array:
         return self.quantity.check(value, what)

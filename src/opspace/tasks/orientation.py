@@ -25,6 +25,8 @@ class OrientationTask(MotionTask):
         axes: Axes to turn about, some of "xyz".
         axes_frame: Whether these are the axes of the world or of the frame ("tool").
         max_speed: Speed that the orientation error may ask for, rad/s.
+        max_acceleration: Acceleration of the way to a new target, rad/s²; see
+            `TrackingTask.max_acceleration`.
         name: Name of the task.
 
     Raises:
@@ -41,6 +43,7 @@ class OrientationTask(MotionTask):
         axes: str = "xyz",
         axes_frame: AxesFrame = "world",
         max_speed: float | None = None,
+        max_acceleration: float | None = None,
         name: str = "orientation",
     ) -> None:
         super().__init__(
@@ -53,4 +56,5 @@ class OrientationTask(MotionTask):
             kp=kp,
             kv=kv,
             max_speed=max_speed,
+            max_acceleration=max_acceleration,
         )

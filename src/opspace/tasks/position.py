@@ -22,6 +22,8 @@ class PositionTask(MotionTask):
         axes: Axes to control, some of "xyz".
         axes_frame: Whether these are the axes of the world or of the frame ("tool").
         max_speed: Speed that the position error may ask for, m/s.
+        max_acceleration: Acceleration of the way to a new target, m/s²; see
+            `TrackingTask.max_acceleration`.
         offset: (3,) point to control in the frame's axes, m; None is the frame's origin.
         name: Name of the task.
 
@@ -39,6 +41,7 @@ class PositionTask(MotionTask):
         axes: str = "xyz",
         axes_frame: AxesFrame = "world",
         max_speed: float | None = None,
+        max_acceleration: float | None = None,
         offset: ArrayLike | None = None,
         name: str = "position",
     ) -> None:
@@ -52,4 +55,5 @@ class PositionTask(MotionTask):
             kp=kp,
             kv=kv,
             max_speed=max_speed,
+            max_acceleration=max_acceleration,
         )

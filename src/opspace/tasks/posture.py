@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
@@ -15,6 +16,7 @@ from opspace.tasks.task import TaskTerms
 from opspace.tasks.tracking import Target, TrackingTask
 from opspace.tasks.validation import Array, finite_array
 from opspace.tasks.way_round import JointTurns
+from opspace.tasks.ways import VectorWay, Way
 
 if TYPE_CHECKING:
     from opspace.robots.protocol import Robot
@@ -37,6 +39,8 @@ class PostureTask(TrackingTask):
         kv: Damping, a number or one per selected joint, 1/s; None is critical, 2 sqrt(kp).
         joints: Names of the joints to control; None is every actuated joint.
         max_speed: Norm of the joint speed that the error may ask for, rad/s.
+        max_acceleration: Acceleration of the way to a new target, rad/s²; see
+            `TrackingTask.max_acceleration`.
         name: Name of the task.
 
     Attributes:
@@ -55,12 +59,20 @@ class PostureTask(TrackingTask):
         kv: ArrayLike | None = None,
         joints: Sequence[str] | None = None,
         max_speed: float | None = None,
+        max_acceleration: float | None = None,
         name: str = "posture",
     ) -> None:
         if isinstance(joints, str) or (joints is not None and len(joints) == 0):
             raise InputError(f"task {name!r}: joints must be a list of names, not {joints!r}")
         super().__init__(
-            name, rows=0, units=(), motion_size=None, kp=kp, kv=kv, max_speed=max_speed
+            name,
+            rows=0,
+            units=(),
+            motion_size=None,
+            kp=kp,
+            kv=kv,
+            max_speed=max_speed,
+            max_acceleration=max_acceleration,
         )
         self._joints = None if joints is None else tuple(joints)
         self.layout: Layout | None = None
@@ -105,6 +117,18 @@ class PostureTask(TrackingTask):
         self.rows = self._motion_size = len(layout.coordinates)
         self.units = layout.units
         self._recheck()
+
+    def _way(self, now: Sample, goal: Array, t: float) -> Way:
+        layout = self.layout
+        assert layout is not None  # bound
+        if layout.quaternions:
+            raise InputError(
+                f"task {self.name!r}: max_acceleration does not go with quaternions "
+                f"({', '.join(layout.names)}); give the target as a reference in time"
+            )
+        way = goal - now.x
+        way[layout.endless] = [math.remainder(x, 2.0 * math.pi) for x in way[layout.endless]]
+        return VectorWay(now, now.x + way, t, self._pace())
 
     def _recheck(self) -> None:
         """Check again what was given before the robot was known."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Protocol
 
 import numpy as np
@@ -9,9 +10,11 @@ from numpy.typing import ArrayLike
 
 from opspace.tasks.motions import Motion
 from opspace.tasks.pose_forms import as_pose
+from opspace.tasks.references.sample import Sample
 from opspace.tasks.rotation import as_rotation, homogeneous
 from opspace.tasks.rotation_error import RotationError
 from opspace.tasks.validation import Array, finite_array
+from opspace.tasks.ways import Pace, PoseWay, RotationWay, VectorWay, Way
 
 
 class Quantity(Protocol):
@@ -39,6 +42,10 @@ class Quantity(Protocol):
         """Return x_d − x, (k,)."""
         ...
 
+    def way(self, now: Sample, goal: Array, t: float, paces: Sequence[Pace]) -> Way:
+        """Return the way from what is followed at time t to a value, one pace for each speed group."""
+        ...
+
     def reset(self) -> None:
         """Forget the past."""
         ...
@@ -62,6 +69,10 @@ class Position:
     def error(self, motion: Motion, desired: Array) -> Array:
         """Return x_d − x, m."""
         return desired - motion.position
+
+    def way(self, now: Sample, goal: Array, t: float, paces: Sequence[Pace]) -> Way:
+        """Return the straight way."""
+        return VectorWay(now, goal, t, paces[0])
 
     def reset(self) -> None:
         """Do nothing: a position has no past."""
@@ -93,6 +104,10 @@ class Orientation:
         self.turn.follow(desired)
         return self.turn(desired @ motion.rotation.T)
 
+    def way(self, now: Sample, goal: Array, t: float, paces: Sequence[Pace]) -> Way:
+        """Return the turn about one axis."""
+        return RotationWay(now, goal, t, paces[0])
+
     def reset(self) -> None:
         """Forget which way round the error went."""
         self.turn.reset()
@@ -121,6 +136,10 @@ class Pose:
         """Return position error above rotation vector, m and rad."""
         turn = self._orientation.error(motion, desired[:3, :3])
         return np.concatenate((desired[:3, 3] - motion.position, turn))
+
+    def way(self, now: Sample, goal: Array, t: float, paces: Sequence[Pace]) -> Way:
+        """Return both ways."""
+        return PoseWay(now, goal, t, *paces)
 
     def reset(self) -> None:
         """Forget which way round the rotation error went."""

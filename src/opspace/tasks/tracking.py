@@ -5,17 +5,19 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from opspace.errors import InputError, UnknownNameError
+from opspace.tasks.gains import one_or_all, paced
 from opspace.tasks.references.sample import Constant, Reference, Sample
 from opspace.tasks.references.start import begun
 from opspace.tasks.rotation import quaternion_from_matrix
 from opspace.tasks.task import Task, TaskTerms
 from opspace.tasks.validation import Array, brief, finite_array, shown
+from opspace.tasks.ways import Pace, VectorWay, Way
 
 if TYPE_CHECKING:
     from opspace.robots.protocol import Robot
@@ -55,12 +57,30 @@ class Followed:
     pauses: float = 0.0
 
 
+@dataclass(frozen=True)
+class Led:
+    """A value that is approached on a way.
+
+    Attributes:
+        target: The target that it belongs to; another one ends it.
+        way: The way to its value.
+    """
+
+    target: Target
+    way: Way
+
+
+Progress: TypeAlias = tuple[
+    "tuple[Hold, Array] | None", "Followed | None", "Led | None", "Target | None"
+]
+
+
 class TrackingTask(Task):
     """Base class of tasks with a target.
 
-    Subclasses say what a target value looks like (``_check_value``), look up names (``_resolve``)
-    and compute their terms (``evaluate``). ``motion_size`` is k, the length of desired velocities,
-    None while it is not known.
+    Subclasses say what a target value looks like (``_check_value``), look up names (``_resolve``),
+    compute their terms (``evaluate``) and, where a value is no vector, how one is approached
+    (``_way``). ``motion_size`` is k, the length of desired velocities, None while it is not known.
     """
 
     def __init__(
@@ -73,12 +93,16 @@ class TrackingTask(Task):
         kp: ArrayLike,
         kv: ArrayLike | None,
         max_speed: float | Sequence[float] | None,
+        max_acceleration: float | Sequence[float] | None = None,
     ) -> None:
         super().__init__(name, rows=rows, units=units, kp=kp, kv=kv, max_speed=max_speed)
+        self.max_acceleration = max_acceleration
         self._robot: Robot | None = None
         self._motion_size = motion_size
         self._held: tuple[Hold, Array] | None = None
         self._followed: Followed | None = None
+        self._led: Led | None = None
+        self._before: Target | None = None
         self._target = Target(Hold(), self._vector(None, ""), self._vector(None, ""))
 
     def bind(self, robot: Robot) -> None:
@@ -101,8 +125,36 @@ class TrackingTask(Task):
             self._followed = replace(followed, pauses=followed.pauses + pause)
 
     def reset(self) -> None:
-        """Forget the held start value; the next tick finds a new one."""
-        self._held = None
+        """Forget the held start value, and where a way has come to; the next tick finds a new one."""
+        self._held = self._led = self._before = None
+
+    @property
+    def progress(self) -> Progress:
+        """What it has found, begun and come to so far; ``recall`` goes back to it."""
+        return self._held, self._followed, self._led, self._before
+
+    def recall(self, progress: Progress) -> None:
+        """Go back to where it was, after somebody has only asked what it would do."""
+        if any(a is not b for a, b in zip(progress, self.progress, strict=True)):
+            self._held, self._followed, self._led, self._before = progress
+
+    @property
+    def max_acceleration(self) -> float | tuple[float, ...] | None:
+        """Acceleration of the way to a new target value, m/s² or rad/s²; None follows it at once.
+
+        With it, a value that is assigned is not followed at once: what the task follows goes there from
+        where it is, within ``max_speed``, this acceleration, and the jerk that reaches it in 0.1 s. So
+        the torque does not step. A task that comes in begins where it finds the robot. References, and
+        values with a ``target_velocity``, are followed as they are.
+        """
+        return one_or_all(self._gains.max_acceleration)
+
+    @max_acceleration.setter
+    def max_acceleration(self, value: float | Sequence[float] | None) -> None:
+        gains = self._gains
+        found = paced(value, gains.max_speed, len(self._speed_groups), self.name)
+        if found != gains.max_acceleration:
+            self._gains = replace(gains, max_acceleration=found)
 
     @property
     def target(self) -> Array | Reference | None:
@@ -205,6 +257,17 @@ class TrackingTask(Task):
             current: Gives the present value, kept when the target is to hold.
         """
         target = self._target  # read once: another thread may replace it during this tick
+        if self._gains.max_acceleration is None:
+            return self._followed_at(target, t, current)
+        before = self._before
+        if target is not before:
+            if isinstance(target.goal, np.ndarray) and not target.velocity.any():
+                self._lead(before, target, target.goal, t, current)
+            self._before = target
+        return self._followed_at(target, t, current)
+
+    def _followed_at(self, target: Target, t: float, current: Callable[[], Array]) -> Sample:
+        """Return what a target means at time t: what is held, referred to, approached or given."""
         goal = target.goal
         if isinstance(goal, Hold):
             held = self._held
@@ -213,7 +276,44 @@ class TrackingTask(Task):
             goal = held[1]
         elif callable(goal):
             return self._sampled(target, goal, t)
+        elif self._led is not None and self._led.target is target:
+            return self._led.way(t)
         return Sample(goal, target.velocity, target.acceleration)
+
+    def _lead(
+        self,
+        before: Target | None,
+        target: Target,
+        goal: Array,
+        t: float,
+        current: Callable[[], Array],
+    ) -> None:
+        """Begin the way to a value, from what is followed until now or else from what is found."""
+        rest = self._vector(None, "")
+        now = (
+            Sample(current().copy(), rest, rest)
+            if before is None
+            else self._followed_at(before, t, current)
+        )
+        self._led = Led(target, self._way(now, goal, t))
+
+    def moves(self, t: float) -> bool:
+        """Tell whether what is desired changes after time ``t`` [s] without anything being assigned."""
+        target, led = self._target, self._led
+        if callable(target.goal):
+            return True
+        return led is not None and led.target is target and t < led.way.end
+
+    def _pace(self, group: int = 0) -> Pace:
+        """Return the limits of the way of a group of rows."""
+        speed, acceleration = self._gains.max_speed, self._gains.max_acceleration
+        assert speed is not None
+        assert acceleration is not None
+        return Pace(speed[group], acceleration[group])
+
+    def _way(self, now: Sample, goal: Array, t: float) -> Way:
+        """Make the way from what is followed at time t to a value, which is in the task's own form."""
+        return VectorWay(now, goal, t, self._pace())
 
     def _sampled(self, target: Target, reference: Reference, t: float) -> Sample:
         what = f"task {self.name!r}: reference at t = {t:.6g} s:"
