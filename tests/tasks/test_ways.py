@@ -273,3 +273,21 @@ def test_scenarios_know_it(tmp_path):
         "  posture: {type: posture, level: 1}\n"
     )
     assert build(load_scenario(path)).controller.stack["hand"].max_acceleration == 2.0
+
+
+def test_the_guide_for_hardware_says_how_much_a_jump_steps():
+    """18 N·m, with its gains on its arm, and next to nothing with max_acceleration."""
+    taus = {}
+    for acceleration in (None, 1.0):
+        robot = osc.load_robot("puma560")
+        hand = osc.PositionTask(kp=50.0, max_speed=0.25, max_acceleration=acceleration)
+        turn, rest = osc.OrientationTask(kp=50.0, max_speed=0.5), osc.PostureTask(kp=16.0)
+        stack = osc.Stack([turn, hand, rest], limits=osc.JointLimits())
+        controller = osc.Controller(robot, stack, torque_limits="priority")
+        q, v = robot.q_reference, np.zeros(6)
+        before = controller.step(0.0, q, v).tau
+        robot.update(q, v)
+        hand.target = robot.position(robot.frame_id(robot.tool)) + [0.0, 0.3, 0.0]
+        taus[acceleration] = np.abs(controller.step(DT, q, v).tau - before).max()
+    assert taus[None] == pytest.approx(18.0, abs=0.5)
+    assert taus[1.0] < 1e-6
