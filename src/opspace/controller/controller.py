@@ -130,7 +130,8 @@ class Controller(ReferenceController):
         command = NEW(
             Command, (t, torque(), status, answer // SOLVE, CompiledReport(plan, memory()))
         )
-        return command if self._handover is None else self._handed_over(command)
+        plain = self._handover is None and self._integral is None
+        return command if plain else self._finished(command, members)
 
     def _begin_anew(self) -> None:
         super()._begin_anew()

@@ -12,6 +12,7 @@ from opspace.command import Command, Found, Status
 from opspace.controller.disturbance import DisturbanceObserver
 from opspace.controller.drivable import check_drivable
 from opspace.controller.handover import Handover
+from opspace.controller.integral import IntegralAction
 from opspace.controller.rates import check_damping, check_limits, with_period
 from opspace.controller.stages import Given, Law, Rules, sum_of_hard_torques, tick
 from opspace.controller.watchdog import Watchdog
@@ -20,7 +21,7 @@ from opspace.law import Profile
 from opspace.plan.scales import DEFAULT_SINGULARITY, Scales, Singularity
 from opspace.robots.protocol import Robot
 from opspace.stack import Blending, Member, Stack
-from opspace.tasks import JointLimits, Task
+from opspace.tasks import JointLimits, Task, TrackingTask
 from opspace.tasks.validation import finite, numbers
 
 BIASES = ("joint", "task")
@@ -106,7 +107,8 @@ class ReferenceController:
             raise InputError(f"on_time_jump={on_time_jump!r} needs the period of the ticks")
         self._timing = None if period is None else Watchdog(period, on_time_jump)
         self._scales = Scales(robot, singularity)
-        stack.attach(self._scales.prepare if period is None else self._paced(period))
+        self._integral: IntegralAction | None = None
+        stack.attach(self._prepared if period is None else self._paced(period))
         self.calibration = self._scales.calibration(list(stack))
         if stack.limits is not None:
             stack.limits.bind(robot, self.calibration.brake)
@@ -128,7 +130,13 @@ class ReferenceController:
         if self._stack.limits is not None:
             check_limits(period, self._stack.limits)
         check_damping(period, self.damping, "damping =")
-        return with_period(self._scales.prepare, period)
+        return with_period(self._prepared, period)
+
+    def _prepared(self, task: Task) -> None:
+        """Get a task ready, and what it needs of the controller."""
+        self._scales.prepare(task)
+        if self._integral is None and isinstance(task, TrackingTask) and task.ki is not None:
+            self._integral = IntegralAction(self._robot, self._scales)
 
     def __repr__(self) -> str:
         handled = "off" if self.singularity is None else repr(self.singularity)
@@ -195,6 +203,14 @@ class ReferenceController:
             )
         return found
 
+    def _finished(self, command: Command, members: Sequence[Member]) -> Command:
+        """Learn from a tick, and mix its torque with another controller's while it is handed over."""
+        if self._handover is not None:
+            return self._handed_over(command)
+        if self._integral is not None:
+            self._integral.after(command, members)
+        return command
+
     def _handed_over(self, command: Command) -> Command:
         """Mix the torque with another controller's while it takes over or hands back."""
         handover = self._handover
@@ -256,7 +272,7 @@ class ReferenceController:
         if Status.FAULT in status:
             tau = self._braking()
         command = Command(t, tau, status | timing, hard_solves, found)
-        return command if self._handover is None else self._handed_over(command)
+        return self._finished(command, members)
 
     @property
     def _holds(self) -> bool:

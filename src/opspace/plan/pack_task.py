@@ -269,7 +269,7 @@ class Packed:
             if held is None or held[0] is not goal:
                 return
             goal = held[1]
-        elif callable(goal) or task._gains.max_acceleration is not None:
+        elif callable(goal) or task._gains.max_acceleration is not None or task.ki is not None:
             return
         sample = Sample(goal, target.velocity, target.acceleration)
         self._write(sample, target, held, task._gains)
@@ -280,7 +280,7 @@ class Packed:
         if not self._timed:  # it may hold what it finds
             robot.check_state(robot.q, robot.v)
         gains = task._gains
-        desired = task.desired(robot, t)
+        desired = task.pushed(task.desired(robot, t))
         self._write(desired, target, task._held, gains)
         self._timed = task.moves(t)
 

@@ -22,6 +22,8 @@ class ComTask(MotionTask):
         max_speed: Speed that the position error may ask for, m/s.
         max_acceleration: Acceleration of the way to a new target, m/s²; see
             `TrackingTask.max_acceleration`.
+        ki: Integral gain, 1/s³, against friction and payload; None is none.
+        max_integral: Error in m or rad whose pull, kp times it, the integral may add at most.
         name: Name of the task.
 
     Raises:
@@ -37,6 +39,8 @@ class ComTask(MotionTask):
         axes: str = "xyz",
         max_speed: float | None = None,
         max_acceleration: float | None = None,
+        ki: float | None = None,
+        max_integral: float = 0.05,
         name: str = "com",
     ) -> None:
         super().__init__(
@@ -50,4 +54,6 @@ class ComTask(MotionTask):
             kv=kv,
             max_speed=max_speed,
             max_acceleration=max_acceleration,
+            ki=ki,
+            max_integral=max_integral,
         )

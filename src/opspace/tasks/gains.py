@@ -53,6 +53,16 @@ class Gains:
             error = self._within_speed(error, self.max_speed)
         return feedforward + self.kv * velocity_error + self.kp * error
 
+    def saturates(self, error: Array) -> bool:
+        """Tell whether a position error (m,) asks for more than the speed limit."""
+        if self.max_speed is None:
+            return False
+        asked = speed_per_error(self.kp, self.kv) * error
+        return any(
+            math.hypot(*asked[rows]) > limit
+            for rows, limit in zip(self.groups, self.max_speed, strict=True)
+        )
+
     def _within_speed(self, error: Array, max_speed: tuple[float, ...]) -> Array:
         # kv v_sat = kp (scale · error): scaling the error saturates the speed it asks for.
         asked = speed_per_error(self.kp, self.kv) * error

@@ -56,6 +56,8 @@ class MotionTask(TrackingTask):
         kv: ArrayLike | None,
         max_speed: float | Sequence[float] | None,
         max_acceleration: float | Sequence[float] | None = None,
+        ki: float | None = None,
+        max_integral: float = 0.05,
     ) -> None:
         if axes_frame not in ("world", "tool"):
             raise InputError(
@@ -71,6 +73,8 @@ class MotionTask(TrackingTask):
             kv=kv,
             max_speed=max_speed,
             max_acceleration=max_acceleration,
+            ki=ki,
+            max_integral=max_integral,
         )
         self.source = source
         self.quantity = quantity
@@ -83,7 +87,7 @@ class MotionTask(TrackingTask):
         self._require_bound(robot)
         quantity, block = self.quantity, self.quantity.block
         motion = self.source.measure(robot)
-        desired = self.desired(robot, t)
+        desired = self.pushed(self.desired(robot, t))
         error = quantity.error(motion, desired.x)
         basis, drift = self.selection, motion.drift[block]
         if self.in_tool_axes:
@@ -123,6 +127,12 @@ class MotionTask(TrackingTask):
 
     def _resolve(self, robot: Robot) -> None:
         self.source.bind(robot)
+
+    def _basis(self, robot: Robot) -> Array:
+        size = len(self.quantity.units)
+        if not self.in_tool_axes:
+            return self.selection
+        return self.selection @ _tool_axes(self.source.measure(robot).rotation)[:size, :size]
 
     def _way(self, now: Sample, goal: Array, t: float) -> Way:
         groups = range(len(self._speed_groups))

@@ -28,6 +28,8 @@ class PoseTask(MotionTask):
         max_speed: Speeds that the error may ask for, (linear m/s, angular rad/s); inf is none.
         max_acceleration: Accelerations of the way to a new target, (linear m/s², angular rad/s²); see
             `TrackingTask.max_acceleration`.
+        ki: Integral gain, 1/s³, against friction and payload; None is none.
+        max_integral: Error in m or rad whose pull, kp times it, the integral may add at most.
         offset: (3,) point to control in the frame's axes, m; None is the frame's origin.
         name: Name of the task.
 
@@ -47,6 +49,8 @@ class PoseTask(MotionTask):
         axes_frame: AxesFrame = "world",
         max_speed: tuple[float, float] | None = None,
         max_acceleration: tuple[float, float] | None = None,
+        ki: float | None = None,
+        max_integral: float = 0.05,
         offset: ArrayLike | None = None,
         name: str = "pose",
     ) -> None:
@@ -61,6 +65,8 @@ class PoseTask(MotionTask):
             kv=kv,
             max_speed=max_speed,
             max_acceleration=max_acceleration,
+            ki=ki,
+            max_integral=max_integral,
         )
 
 

@@ -41,6 +41,8 @@ class PostureTask(TrackingTask):
         max_speed: Norm of the joint speed that the error may ask for, rad/s.
         max_acceleration: Acceleration of the way to a new target, rad/s²; see
             `TrackingTask.max_acceleration`.
+        ki: Integral gain, 1/s³, against friction and payload; None is none.
+        max_integral: Error in m or rad whose pull, kp times it, the integral may add at most.
         name: Name of the task.
 
     Attributes:
@@ -60,6 +62,8 @@ class PostureTask(TrackingTask):
         joints: Sequence[str] | None = None,
         max_speed: float | None = None,
         max_acceleration: float | None = None,
+        ki: float | None = None,
+        max_integral: float = 0.05,
         name: str = "posture",
     ) -> None:
         if isinstance(joints, str) or (joints is not None and len(joints) == 0):
@@ -73,6 +77,8 @@ class PostureTask(TrackingTask):
             kv=kv,
             max_speed=max_speed,
             max_acceleration=max_acceleration,
+            ki=ki,
+            max_integral=max_integral,
         )
         self._joints = None if joints is None else tuple(joints)
         self.layout: Layout | None = None
@@ -85,7 +91,7 @@ class PostureTask(TrackingTask):
         layout = self.layout
         assert layout is not None  # bound
         q = robot.q
-        desired = self.desired(robot, t)
+        desired = self.pushed(self.desired(robot, t))
         q_desired = q.copy()
         q_desired[layout.entries] = desired.x
         error = robot.difference(q, q_desired)[layout.coordinates]

@@ -28,6 +28,8 @@ class RelativePositionTask(MotionTask):
         max_speed: Speed that the position error may ask for, m/s.
         max_acceleration: Acceleration of the way to a new target, m/s²; see
             `TrackingTask.max_acceleration`.
+        ki: Integral gain, 1/s³, against friction and payload; None is none.
+        max_integral: Error in m or rad whose pull, kp times it, the integral may add at most.
         name: Name of the task.
 
     Raises:
@@ -45,6 +47,8 @@ class RelativePositionTask(MotionTask):
         axes: str = "xyz",
         max_speed: float | None = None,
         max_acceleration: float | None = None,
+        ki: float | None = None,
+        max_integral: float = 0.05,
         name: str = "relative_position",
     ) -> None:
         super().__init__(
@@ -58,6 +62,8 @@ class RelativePositionTask(MotionTask):
             kv=kv,
             max_speed=max_speed,
             max_acceleration=max_acceleration,
+            ki=ki,
+            max_integral=max_integral,
         )
 
 
@@ -77,6 +83,8 @@ class RelativeOrientationTask(MotionTask):
         max_speed: Speed that the orientation error may ask for, rad/s.
         max_acceleration: Acceleration of the way to a new target, rad/s²; see
             `TrackingTask.max_acceleration`.
+        ki: Integral gain, 1/s³, against friction and payload; None is none.
+        max_integral: Error in m or rad whose pull, kp times it, the integral may add at most.
         name: Name of the task.
 
     Raises:
@@ -94,6 +102,8 @@ class RelativeOrientationTask(MotionTask):
         axes: str = "xyz",
         max_speed: float | None = None,
         max_acceleration: float | None = None,
+        ki: float | None = None,
+        max_integral: float = 0.05,
         name: str = "relative_orientation",
     ) -> None:
         super().__init__(
@@ -107,6 +117,8 @@ class RelativeOrientationTask(MotionTask):
             kv=kv,
             max_speed=max_speed,
             max_acceleration=max_acceleration,
+            ki=ki,
+            max_integral=max_integral,
         )
 
 
@@ -127,6 +139,8 @@ class RelativePoseTask(MotionTask):
         max_speed: Speeds that the error may ask for, (linear m/s, angular rad/s); inf is none.
         max_acceleration: Accelerations of the way to a new target, (linear m/s², angular rad/s²); see
             `TrackingTask.max_acceleration`.
+        ki: Integral gain, 1/s³, against friction and payload; None is none.
+        max_integral: Error in m or rad whose pull, kp times it, the integral may add at most.
         name: Name of the task.
 
     Raises:
@@ -145,6 +159,8 @@ class RelativePoseTask(MotionTask):
         kp_angular: float | None = None,
         max_speed: tuple[float, float] | None = None,
         max_acceleration: tuple[float, float] | None = None,
+        ki: float | None = None,
+        max_integral: float = 0.05,
         name: str = "relative_pose",
     ) -> None:
         super().__init__(
@@ -158,4 +174,6 @@ class RelativePoseTask(MotionTask):
             kv=kv,
             max_speed=max_speed,
             max_acceleration=max_acceleration,
+            ki=ki,
+            max_integral=max_integral,
         )

@@ -16,7 +16,7 @@ from opspace.tasks.references.sample import Constant, Reference, Sample
 from opspace.tasks.references.start import begun
 from opspace.tasks.rotation import quaternion_from_matrix
 from opspace.tasks.task import Task, TaskTerms
-from opspace.tasks.validation import Array, brief, finite_array, shown
+from opspace.tasks.validation import Array, brief, finite_array, positive, shown
 from opspace.tasks.ways import Pace, VectorWay, Way
 
 if TYPE_CHECKING:
@@ -94,9 +94,14 @@ class TrackingTask(Task):
         kv: ArrayLike | None,
         max_speed: float | Sequence[float] | None,
         max_acceleration: float | Sequence[float] | None = None,
+        ki: float | None = None,
+        max_integral: float = 0.05,
     ) -> None:
         super().__init__(name, rows=rows, units=units, kp=kp, kv=kv, max_speed=max_speed)
         self.max_acceleration = max_acceleration
+        self._ki = None if ki is None else positive(ki, f"task {name!r}: ki")
+        self._max_integral = positive(max_integral, f"task {name!r}: max_integral")
+        self._integral: Array | None = None
         self._robot: Robot | None = None
         self._motion_size = motion_size
         self._held: tuple[Hold, Array] | None = None
@@ -113,20 +118,64 @@ class TrackingTask(Task):
             self._resolve(robot)
         except UnknownNameError as error:
             raise error.reworded(f"task {self.name!r}: {error}") from None
+        if self._ki is not None and np.any(self._ki >= self._gains.kp * self._gains.kv):
+            raise InputError(
+                f"task {self.name!r}: ki = {self._ki:g} 1/s³ diverges; it must be below kp kv = "
+                f"{float(np.min(self._gains.kp * self._gains.kv)):g} 1/s³"
+            )
         self._robot = robot
         self._followed = None
         self.reset()
 
     def resume(self, pause: float) -> None:
-        """See `Task.resume`; a reference goes on where it was, and what is held is found anew."""
+        """See `Task.resume`; a reference and the integral go on where they were."""
+        integral = self._integral
         super().resume(pause)
+        self._integral = integral
         followed = self._followed
         if followed is not None:
             self._followed = replace(followed, pauses=followed.pauses + pause)
 
     def reset(self) -> None:
-        """Forget the held start value, and where a way has come to; the next tick finds a new one."""
-        self._held = self._led = self._before = None
+        """Forget the held start value, the integral, and where a way has come to."""
+        self._held = self._led = self._before = self._integral = None
+
+    @property
+    def ki(self) -> float | None:
+        """Integral gain, 1/s³; None is no integral action. See `opspace.controller.integral`."""
+        return self._ki
+
+    @property
+    def integral(self) -> Array:
+        """(k,) acceleration that the integral adds to f*, m/s² or rad/s², before rows are selected."""
+        return self._vector(None, "") if self._integral is None else self._integral
+
+    def integrate(self, robot: Robot, error: Array, dt: float) -> None:
+        """Add to the integral, within its bound.
+
+        Args:
+            robot: The robot given to ``bind``, at the state of the error.
+            error: (m,) error to integrate, m or rad.
+            dt: For how long, s.
+        """
+        assert self._ki is not None
+        basis = self._basis(robot)
+        most = np.abs(basis).T @ np.broadcast_to(self._max_integral * self._gains.kp, len(basis))
+        moved = self.integral + self._ki * dt * (basis.T @ error)
+        self._integral = np.clip(moved, -most, most)
+
+    def asks_too_much(self, error: Array) -> bool:
+        """Tell whether an error (m,) asks for more than ``max_speed``."""
+        return self._gains.saturates(error)
+
+    def pushed(self, desired: Sample) -> Sample:
+        """Add the integral to the desired acceleration."""
+        return desired if self._integral is None else desired._replace(a=desired.a + self._integral)
+
+    def _basis(self, robot: Robot) -> Array:
+        """Return the task's rows, (m, k), in the coordinates of its motion."""
+        del robot
+        return np.eye(self.rows)
 
     @property
     def progress(self) -> Progress:
@@ -300,7 +349,7 @@ class TrackingTask(Task):
     def moves(self, t: float) -> bool:
         """Tell whether what is desired changes after time ``t`` [s] without anything being assigned."""
         target, led = self._target, self._led
-        if callable(target.goal):
+        if callable(target.goal) or self._ki is not None:
             return True
         return led is not None and led.target is target and t < led.way.end
 
