@@ -193,6 +193,22 @@ def test_what_is_followed_before_is_where_the_way_begins():
     assert not task.moves(20.0)
 
 
+def test_the_same_value_again_is_the_same_way():
+    task, robot = osc.PositionTask(max_speed=0.5, max_acceleration=2.0), osc.load_robot("puma560")
+    task.bind(robot)
+    robot.update(robot.q_reference, np.zeros(6))
+    task.target = [0.3, 0.2, 0.4]
+    task.desired(robot, 0.0)
+    way = task._led.way
+    for k in range(5):
+        task.target = [0.3, 0.2, 0.4]
+        task.desired(robot, k * DT)
+        assert task._led.way is way
+    task.target = [0.3, 0.2, 0.5]
+    task.desired(robot, 0.1)
+    assert task._led.way is not way
+
+
 def test_a_value_with_a_velocity_is_followed_as_it_is():
     task = osc.PositionTask(max_speed=0.5, max_acceleration=2.0)
     robot = osc.load_robot("puma560")

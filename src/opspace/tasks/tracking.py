@@ -338,6 +338,11 @@ class TrackingTask(Task):
         current: Callable[[], Array],
     ) -> None:
         """Begin the way to a value, from what is followed until now or else from what is found."""
+        led, known = self._led, None if before is None else before.goal
+        repeated = isinstance(known, np.ndarray) and np.array_equal(known, goal)
+        if repeated and led is not None and led.target is before:
+            self._led = Led(target, led.way)  # the same again, as of a value that is streamed
+            return
         rest = self._vector(None, "")
         now = (
             Sample(current().copy(), rest, rest)
