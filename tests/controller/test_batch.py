@@ -40,11 +40,12 @@ def states(robot, count, seed=0, spread=0.8):
     return q, rng.uniform(-1.0, 1.0, (count, robot.nv))
 
 
-def remembered(controller):
+def remembered(controller, t):
     """What one tick leaves to the next: groups of the blend, and which way rotations went."""
     plan = controller._plan
     if plan is None:
         return []
+    plan.refresh(controller.robot, t)  # a target that has jumped since then makes it forget
     tick = plan.tick
     return [tick.group, tick.kind[:, REMEMBERS], tick.numbers[:, TURN : TURN + 4]]
 
@@ -54,10 +55,11 @@ def assert_rows_are_ticks(controller, count=40, t=None, seed=0):
     q, v = states(controller.robot, count, seed)
     found = controller.torque_batch(q, v, t)
     statuses = osc.Status.OK
-    memory = remembered(controller)
+    t = controller.stack.time if t is None else t
+    memory = remembered(controller, t)
     kept = [part.copy() for part in memory]
     for row, q_row, v_row in zip(found, q, v, strict=True):
-        command = controller.step(controller.stack.time if t is None else t, q_row, v_row)
+        command = controller.step(t, q_row, v_row)
         assert np.max(np.abs(row - command.tau)) <= 1e-9 * max(1.0, np.max(np.abs(command.tau)))
         statuses |= command.status
         for part, before in zip(memory, kept, strict=True):

@@ -179,3 +179,18 @@ def test_mjcf_says_limits_and_postures(robot: Robot) -> None:
     np.testing.assert_array_equal(robot.q_reference, robot.configurations["home"])
     assert robot.floating_base
     assert robot.frame_names[0] == "world"
+
+
+@pytest.mark.parametrize("backend", BACKENDS)
+@pytest.mark.parametrize("query", ["position", "rotation", "jacobian", "velocity", "drift"])
+def test_frames_are_asked_by_id_or_name_and_others_are_refused(backend, query):
+    robot = load_robot("puma560", backend=backend)
+    robot.update(robot.q_reference, np.linspace(0.1, 0.6, 6))
+    ask, last = getattr(robot, query), len(robot.frame_names) - 1
+    np.testing.assert_array_equal(ask(robot.tool), ask(robot.frame_id(robot.tool)))
+    np.testing.assert_array_equal(ask(np.int64(last)), ask(last))
+    with pytest.raises(UnknownNameError, match=r"frame of puma560 'tol'.*tool"):
+        ask("tol")
+    for wrong in (-1, last + 1, 1.0, None):
+        with pytest.raises(InputError, match=rf"puma560 has frames 0 to {last}, not {wrong}"):
+            ask(wrong)

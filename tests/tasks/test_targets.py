@@ -148,7 +148,7 @@ def test_a_target_is_copied(arm):
 
 def test_a_reference_gives_value_velocity_and_acceleration(arm, rng):
     q, v = random_state(arm, rng)
-    reference = MinimumJerk([0.1, 0.2, 0.3], [0.5, 0.4, 0.1], 2.0)
+    reference = MinimumJerk([0.1, 0.2, 0.3], [0.5, 0.4, 0.1], 2.0, start_time=0.0)
     followed, fixed = PositionTask(target=reference), PositionTask()
     for t in (-1.0, 0.0, 0.7, 1.9, 5.0):
         fixed.set_target(*reference(t))
@@ -161,8 +161,9 @@ def test_a_reference_gives_value_velocity_and_acceleration(arm, rng):
 
 def test_pose_reference_drives_position_and_orientation_rows(arm, rng):
     q, v = random_state(arm, rng)
-    position = MinimumJerk([0.1, 0.2, 0.3], [0.5, 0.4, 0.1], 2.0)
-    orientation = OrientationMinimumJerk(np.eye(3), exp_rotation(np.array([0.1, 1.0, -0.5])), 1.0)
+    position = MinimumJerk([0.1, 0.2, 0.3], [0.5, 0.4, 0.1], 2.0, start_time=0.0)
+    R = exp_rotation(np.array([0.1, 1.0, -0.5]))
+    orientation = OrientationMinimumJerk(np.eye(3), R, 1.0, start_time=0.0)
     parts = [PositionTask(target=position), OrientationTask(target=orientation)]
     whole = PoseTask(target=PoseReference(position, orientation))
     for task in (*parts, whole):
@@ -260,7 +261,7 @@ def test_a_tick_never_sees_half_of_a_target(arm):
 
 
 def test_a_joint_reference_may_be_a_number(arm):
-    task = JointTask(arm.joint_names[1], MinimumJerk(0.0, 1.0, 2.0))
+    task = JointTask(arm.joint_names[1], MinimumJerk(0.0, 1.0, 2.0, start_time=0.0))
     task.bind(arm)
     still = np.zeros(arm.nv)
     expected = 0.5 - arm.q_reference[1]

@@ -83,9 +83,10 @@ class Batch:
             InputError: A reference or activation gave unusable numbers.
         """
         own = self._own_activations(Q, V, t)
-        for plan in self._plans:
-            plan.refresh(self.robot, t)
-        remembered = _remembered(self._plans[0], before)
+        first = self._plans[0]
+        first.go_on_from(before, first.members)
+        self._refresh(t)
+        remembered = _remembered(first)
         tau = np.zeros(Q.shape)
         chunks = iter(range(0, len(Q), CHUNK))
 
@@ -109,6 +110,15 @@ class Batch:
             robot.update(q, v)
             row[:] = np.nan_to_num(robot.gravity, nan=0.0, posinf=0.0, neginf=0.0)
         return found
+
+    def _refresh(self, t: float) -> None:
+        """Bring all plans up to date, without beginning for the tasks what they have not begun."""
+        tasks = [m.task for m in self.members if isinstance(m.task, TrackingTask)]
+        progress = [task.progress for task in tasks]
+        for plan in self._plans:
+            plan.refresh(self.robot, t)
+        for task, before in zip(tasks, progress, strict=True):
+            task.recall(before)
 
     def _own_activations(self, Q: np.ndarray, V: np.ndarray, t: float) -> np.ndarray:
         """Evaluate the activations that users gave to tasks, in Python, state by state."""
@@ -206,10 +216,9 @@ def check_members(members: tuple[Member, ...]) -> None:
             )
 
 
-def _remembered(plan: Plan, before: Plan | None) -> Handle:
-    """Return what the plan before leaves to this one."""
+def _remembered(plan: Plan) -> Handle:
+    """Return what a plan knows of the tick before."""
     tick = plan.tick
-    plan.go_on_from(before, plan.members)
     found = {
         "group": tick.group.copy(),
         "remembers": tick.kind[:, REMEMBERS].copy(),

@@ -107,6 +107,7 @@ class Controller(ReferenceController):
             robot.check_state(robot.q, robot.v)
             timing = int(watch.check(t, robot.q, robot.v))
             if timing & TIME_JUMP and self._holds:
+                self._begin_anew()
                 return self._hold(t, STATUSES[timing])
         members = begin_tick(t)
         laid_out = self._laid_out
@@ -129,7 +130,12 @@ class Controller(ReferenceController):
         command = NEW(
             Command, (t, torque(), status, answer // SOLVE, CompiledReport(plan, memory()))
         )
-        return command if self._plain else self._for_robot(command)
+        return command if self._plain else self._finished(command, members)
+
+    def _begin_anew(self) -> None:
+        super()._begin_anew()
+        if self._plan is not None:
+            self._plan.forget_ways()
 
     def _learn(self, t: float, observer: DisturbanceObserver) -> int:
         """Tick with joint limits that learn what the model does not explain."""

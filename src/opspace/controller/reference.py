@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,6 +12,8 @@ from opspace.command import Command, Found, Status
 from opspace.controller.disturbance import DisturbanceObserver
 from opspace.controller.drivable import check_drivable
 from opspace.controller.handover import Handover
+from opspace.controller.integral import IntegralAction
+from opspace.controller.rates import check_damping, check_limits, with_period
 from opspace.controller.stages import Given, Law, Rules, sum_of_hard_torques, tick
 from opspace.controller.watchdog import Watchdog
 from opspace.errors import InputError, unknown_name
@@ -19,7 +21,7 @@ from opspace.law import Profile
 from opspace.plan.scales import DEFAULT_SINGULARITY, Scales, Singularity
 from opspace.robots.protocol import Robot
 from opspace.stack import Blending, Member, Stack
-from opspace.tasks import JointLimits
+from opspace.tasks import JointLimits, Task, TrackingTask
 from opspace.tasks.validation import finite, numbers
 
 BIASES = ("joint", "task")
@@ -58,14 +60,16 @@ class ReferenceController:
             with in case of a fault. Unused where a posture task covers every joint.
         torque_limits: What happens to a torque above the motors' limits, see `TORQUE_LIMITS`.
         period: Time between two ticks, s, if ticks and states shall be watched: late, jumping and stale
-            ones are then reported in the status. None watches nothing.
+            ones are then reported in the status, and joint limits and gains that need more frequent
+            ticks refused. None watches nothing.
         on_time_jump: What happens when time runs backwards or jumps, see
             `opspace.controller.watchdog.POLICIES`; it needs ``period``.
         law: Torque of task sets, to compare with the library's own; see
             `opspace.controller.stages.Question` for what it is asked.
 
     Raises:
-        InputError: The robot is not fully actuated, or an option cannot be used.
+        InputError: The robot is not fully actuated, or an option cannot be used; the joint limits or
+            the damping of a task need a shorter ``period``.
         UnknownNameError: A task names a frame or joint that the robot does not have.
     """
 
@@ -115,12 +119,13 @@ class ReferenceController:
             raise InputError(f"on_time_jump={on_time_jump!r} needs the period of the ticks")
         self._timing = None if period is None else Watchdog(period, on_time_jump)
         self._scales = Scales(robot, singularity)
-        stack.attach(self._scales.prepare)
+        self._integral: IntegralAction | None = None
+        stack.attach(self._prepared if period is None else self._paced(period))
         self.calibration = self._scales.calibration(list(stack))
         if stack.limits is not None:
             stack.limits.bind(robot, self.calibration.brake)
         self._handover: Handover | None = None
-        self._plain = not self._robot_adds  # what is computed is what is commanded
+        self._plain = not self._robot_adds and self._integral is None  # what is computed is what is commanded
         self._observer = _observer(stack.limits, robot.nv, torque_limits)
         self._rules = Rules(
             law,
@@ -132,6 +137,20 @@ class ReferenceController:
             stack.limits,
             self._observer,
         )
+
+    def _paced(self, period: float) -> Callable[[Task], None]:
+        """Check the rates of everything that is there now, and of every task that is prepared later."""
+        if self._stack.limits is not None:
+            check_limits(period, self._stack.limits)
+        check_damping(period, self.damping, "damping =")
+        return with_period(self._prepared, period)
+
+    def _prepared(self, task: Task) -> None:
+        """Get a task ready, and what it needs of the controller."""
+        self._scales.prepare(task)
+        if self._integral is None and isinstance(task, TrackingTask) and task.ki is not None:
+            self._integral = IntegralAction(self._robot, self._scales)
+            self._plain = False
 
     def __repr__(self) -> str:
         handled = "off" if self.singularity is None else repr(self.singularity)
@@ -146,7 +165,8 @@ class ReferenceController:
         """Begin at the torque that is on the robot, and move to the controller's own.
 
         The next tick answers ``tau``; see `opspace.controller.handover.Handover`. Called again, or
-        after `hand_back`, it begins anew.
+        after `hand_back`, it begins anew. It is a `restart`: somebody else may have moved the robot
+        meanwhile, and the controller holds it where it finds it.
 
         Args:
             tau: (n,) torque that is on the robot now, N·m; without gravity where the robot adds it.
@@ -156,6 +176,26 @@ class ReferenceController:
             InputError: A torque of another size or not finite, or a duration that is none.
         """
         self._begin(Handover(self._joint_torque(tau), duration, back=False))
+        self.restart()
+
+    def restart(self) -> None:
+        """Go on at the next tick as if no time had passed since the last, wherever the robot is now.
+
+        After a stop, with a clock that went on or began anew: tasks without a target hold what they
+        find, references and transitions go on from where they were, what waits for its time waits on,
+        angles take the short way, and the tick is neither late nor a jump in time. A target that is a
+        value stays what it is; give another one where the robot should not go there. Times that are
+        given from now on are those of the clock after the pause. From any thread, between two ticks.
+        """
+        if self._timing is not None:
+            self._timing.forget()
+        self._begin_anew()
+
+    def _begin_anew(self) -> None:
+        """Let the next tick depend on nothing that the robot did before it."""
+        if self._observer is not None:
+            self._observer.forget_last()
+        self.stack.resume()
 
     def hand_back(self, tau: ArrayLike, duration: float = 0.5) -> None:
         """Move from the controller's torque to the one that takes over, and stay there.
@@ -181,16 +221,19 @@ class ReferenceController:
             )
         return found
 
-    def _for_robot(self, command: Command) -> Command:
-        """Leave out what the robot adds, and mix in another controller's torque in a handover."""
+    def _finished(self, command: Command, members: Sequence[Member]) -> Command:
+        """Learn from a tick, leave out what the robot adds, mix with another's torque in a handover."""
+        if self._handover is None and self._integral is not None:
+            self._integral.after(command, members)
         added, handover = self._added_by_robot(), self._handover
         if handover is None:
-            return command._replace(tau=command.tau - added)
+            return command._replace(tau=command.tau - added) if self._robot_adds else command
         if self._observer is not None:
             self._observer.forget_last()
         tau = handover.torque(command.t, command.tau - added, self.robot.torque_limit, added)
         if handover.done:
-            self._handover, self._plain = None, not self._robot_adds
+            self._handover = None
+            self._plain = not self._robot_adds and self._integral is None
         return command._replace(tau=tau, status=command.status | Status.HANDOVER)
 
     def _added_by_robot(self) -> np.ndarray:
@@ -234,6 +277,7 @@ class ReferenceController:
         robot.update(numbers(q, "q"), numbers(v, "v"))
         timing = Status.OK if self._timing is None else self._timing.check(t, robot.q, robot.v)
         if timing & Status.TIME_JUMP and self._holds:
+            self._begin_anew()
             return self._hold(t, timing)
         return self._answer(t, self.stack.begin_tick(t), timing)
 
@@ -248,7 +292,7 @@ class ReferenceController:
         if Status.FAULT in status:
             tau = self._braking()
         command = Command(t, tau, status | timing, hard_solves, found)
-        return command if self._plain else self._for_robot(command)
+        return command if self._plain else self._finished(command, members)
 
     @property
     def _holds(self) -> bool:

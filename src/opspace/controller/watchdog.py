@@ -11,7 +11,7 @@ from opspace.errors import InputError, unknown_name
 
 POLICIES = ("report", "hold", "raise")
 """What happens when time runs backwards or jumps: ``report`` goes on and says so, ``hold`` brakes with
-joint damping for that tick, ``raise`` raises."""
+joint damping for that tick and goes on as after `opspace.Controller.restart`, ``raise`` raises."""
 
 MISSED = 1.5
 """A tick that comes later than this many periods after the one before has missed one."""
@@ -39,6 +39,10 @@ class Watchdog:
         self.period = float(period)
         self.policy = policy
         self._before: tuple[float, np.ndarray, np.ndarray] | None = None
+
+    def forget(self) -> None:
+        """Forget the tick before: whatever time and state come next are right."""
+        self._before = None
 
     def check(self, t: float, q: np.ndarray, v: np.ndarray) -> Status:
         """Compare a tick with the one before.

@@ -40,6 +40,8 @@ GOAL_ACCELERATION = 45
 MAX_SPEED = 51
 TURN = 53
 NUMBERS_SIZE = 57
+# TURN: of a motion its last rotation, a quaternion; of joints the signs of their last errors, as bits
+# of four whole numbers.
 
 # Columns of Tick.variable: an activation in time, as `opspace.law.scalars.ramp` takes it.
 PROFILE = 0

@@ -24,8 +24,9 @@ from opspace.kernels.columns import (
     TOOL_AXES,
     TURN,
 )
-from opspace.kernels.compiled_scalars import goes_on, speed_scale
+from opspace.kernels.compiled_scalars import goes_on, speed_scale, without_turns
 from opspace.kernels.motion import A, P, R, V, measure, move_joints
+from opspace.law.scalars import SIGNS
 from opspace.machine.jit import jit
 
 
@@ -51,6 +52,7 @@ def _joint_task(work, i):
     for row in range(first, first + rows):
         work.error[row] = work.goal[row, 0] - work.q[work.coordinate[row]]
         work.drift[row] = 0.0
+    _leave_out_turns(work, i, first, rows)
     scale = 1.0
     if work.kind[i, SPEED_LIMITED] != 0:
         scale = _within_speed(work, first, first + rows, work.numbers[i, MAX_SPEED])
@@ -59,6 +61,24 @@ def _joint_task(work, i):
         work.wanted[row] = (
             work.goal[row, 2] + work.kv[row] * rate + work.kp[row] * (work.error[row] * scale)
         )
+
+
+@jit
+def _leave_out_turns(work, i, first, rows):
+    """Leave whole turns out of the errors of joints without end (`opspace.tasks.way_round`)."""
+    number, known = work.numbers[i], work.kind[i, REMEMBERS] != 0
+    before, now = 0, 0
+    for k in range(rows):
+        if k % SIGNS == 0:
+            before, now = int(number[TURN + k // SIGNS]), 0
+        row, sign = first + k, 1 << (k % SIGNS)
+        if work.endless[row] != 0:
+            error = without_turns(work.error[row], known, before & sign != 0)
+            work.error[row] = error
+            if error < 0.0:
+                now |= sign
+        number[TURN + k // SIGNS] = now
+    work.kind[i, REMEMBERS] = 1
 
 
 @jit

@@ -257,6 +257,10 @@ turn are far smaller; at a full turn the direction would be lost, so it cannot b
 LONGEST_WAY = math.cos(0.5 * (math.pi + BRANCH_HOLD))
 
 
+SIGNS = 48
+"""Signs that are remembered as the bits of one whole number, exact as a floating-point number, too."""
+
+
 def goes_on(agreement: float, w: float) -> bool:
     """Tell whether a rotation error goes on the long way round.
 
@@ -265,6 +269,27 @@ def goes_on(agreement: float, w: float) -> bool:
         w: Its real part; that of the long way round, cos(angle / 2), is −w.
     """
     return agreement < 0.0 and -w >= LONGEST_WAY
+
+
+def without_turns(error: float, known: bool, negative: bool) -> float:
+    """Error of a joint that turns without end, less whole turns.
+
+    It is the short way, at most half a turn; past half a turn the direction chosen before goes on, as
+    that of a rotation does.
+
+    Args:
+        error: x_d − x, rad.
+        known: Whether the direction chosen before is known.
+        negative: Whether that error was below zero.
+    """
+    short = error
+    if abs(error) > math.pi:
+        short = error - 2.0 * math.pi * math.ceil(error / (2.0 * math.pi) - 0.5)
+    if known and negative != (short < 0.0):
+        long = short - 2.0 * math.pi if negative else short + 2.0 * math.pi
+        if abs(long) <= math.pi + BRANCH_HOLD:
+            return long
+    return short
 
 
 def speed_scale(speed: float, limit: float) -> float:

@@ -43,6 +43,7 @@ from opspace.kernels.columns import (
     TURN,
     WORLD,
 )
+from opspace.law.scalars import SIGNS
 from opspace.machine.field_table import Record
 from opspace.robots.adapter import AdapterBase
 from opspace.robots.motion_axes import FramePlace, MotionAxes
@@ -56,6 +57,7 @@ from opspace.tasks.posture import PostureTask
 from opspace.tasks.quantities import Orientation, Pose, Position
 from opspace.tasks.references import Sample
 from opspace.tasks.tracking import Hold
+from opspace.tasks.way_round import WayRound
 
 QUANTITIES = {Position: POSITION, Orientation: ORIENTATION, Pose: POSE}
 SOURCES = {WorldFrame: WORLD, RelativeFrame: RELATIVE, CenterOfMass: CENTRE_OF_MASS}
@@ -65,6 +67,7 @@ HONOURED = {
     "activation",
     "bind",
     "reset",
+    "resume",
     "row_axes",
     "_resolve",
     "_recheck",
@@ -75,6 +78,9 @@ HONOURED = {
 does."""
 PACKED_ONCE = ("source", "quantity", "selection", "in_tool_axes", "layout", "rows")
 """Attributes that a subclass may not compute anew, as a property would."""
+
+MOST_JOINTS = 4 * SIGNS
+"""Joints of a task whose signs fit into what compiled code remembers of it."""
 
 SETTLED = (MotionTask.desired, PostureTask.desired)
 
@@ -90,7 +96,7 @@ def kind_of(task: Task) -> int:
     if built_in is None or _overrides(task, built_in) or type(task._gains) is not Gains:
         return OWN
     if isinstance(task, PostureTask):
-        return JOINTS
+        return JOINTS if task.rows <= MOST_JOINTS else OWN
     assert isinstance(task, MotionTask)
     known_parts = type(task.source) in SOURCES and type(task.quantity) in QUANTITIES
     return MOTION if known_parts else OWN
@@ -144,15 +150,23 @@ class Packed:
         covers = isinstance(task, PostureTask) and task.rows == axes.v.size
         kind[COVERS_ALL] = int(covers)
         tick.numbers[index] = np.zeros(NUMBERS_SIZE)
-        # Which way round the rotation went, where there is one.
+        # Which way round angles went, where there are any.
         self.remembers = kind[REMEMBERS : REMEMBERS + 1]
-        self.turn: np.ndarray | None = None
+        self.turn = tick.numbers[index, TURN : TURN + 4]
+        self.way_round: WayRound | None = None
+        self._turning = np.zeros(0)
         if kind[KIND] == MOTION:
             self._pack_source(axes)
             if kind[QUANTITY] != POSITION:
-                self.turn = tick.numbers[index, TURN : TURN + 4]
+                self.way_round = self.task.quantity.turn
+                self._turning = tick.numbers[index, GOAL_ROTATION : GOAL_ROTATION + 9]
         elif kind[KIND] == JOINTS:
-            tick.coordinate[self.rows] = self.task.layout.coordinates
+            layout = self.task.layout
+            tick.coordinate[self.rows] = layout.coordinates
+            tick.endless[self.rows] = layout.endless
+            if layout.endless.any():
+                self.way_round = self.task.turn
+                self._turning = tick.goal[self.rows, 0]
         self._pack_ahead()
 
     def refresh(self, robot: AdapterBase, t: float) -> None:
@@ -188,26 +202,39 @@ class Packed:
         self.moving = self.own_kind or self._timed or self._own_activation or silent
 
     def remember(self, before: Packed | None) -> None:
-        """Go on from the same task in the plan before: which way round a rotation went."""
-        if self.turn is None or before is self:
+        """Go on from the same task in the plan before: which way round it went, and to where."""
+        if self.way_round is None or before is self:
             return  # none is remembered, or it is there already
-        if before is None or before.turn is None:
+        if before is None or before.way_round is None:
             self.remembers[0] = 0
         else:
-            self.remembers[0] = before.remembers[0]
-            self.turn[:] = before.turn
+            self._go_on(before.remembers[0], before.turn, before._turning)
 
     def leave(self) -> None:
-        """Let the readable form go on with the turn of the rotation, from the tick before."""
-        if self.turn is not None:
-            w, x, y, z = self.turn.tolist()
-            self.task.quantity.turn.previous = (w, x, y, z) if self.remembers[0] else None
+        """Let the readable form go on with the way round, from the tick before."""
+        if self.way_round is not None:
+            a, b, c, d = self.turn.tolist()
+            self.way_round.previous = (a, b, c, d) if self.remembers[0] else None
+            goal = self._turning.copy()
+            self.way_round.goal = goal.reshape(3, 3) if goal.size == 9 else goal
 
     def come_back(self) -> None:
-        """Go on with the turn of the rotation, from the readable form's tick before."""
-        if self.turn is not None and self.task.quantity.turn.previous is not None:
-            self.turn[:] = self.task.quantity.turn.previous
-            self.remembers[0] = 1
+        """Go on with the way round, from the readable form's tick before."""
+        known = self.way_round
+        if known is not None and known.previous is not None and known.goal is not None:
+            goal = known.goal[:3, :3].ravel() if known.goal.ndim == 2 else known.goal
+            self._go_on(1, known.previous, goal)
+
+    def forget(self) -> None:
+        """Take the short way at the next tick."""
+        self.remembers[0] = 0
+
+    def _go_on(self, remembers: int, turn: Any, goal: np.ndarray) -> None:
+        """Take over the way round to a goal; whether the target is still there is seen at packing."""
+        self.remembers[0] = remembers
+        self.turn[:] = turn
+        self._turning[:] = goal
+        self.target = None
 
     def _evaluate(self, robot: AdapterBase, t: float) -> None:
         tick, rows = self._tick, self.rows
@@ -242,7 +269,7 @@ class Packed:
             if held is None or held[0] is not goal:
                 return
             goal = held[1]
-        elif callable(goal):
+        elif callable(goal) or task._gains.max_acceleration is not None or task.ki is not None:
             return
         sample = Sample(goal, target.velocity, target.acceleration)
         self._write(sample, target, held, task._gains)
@@ -253,11 +280,13 @@ class Packed:
         if not self._timed:  # it may hold what it finds
             robot.check_state(robot.q, robot.v)
         gains = task._gains
-        desired = task.desired(robot, t)
+        desired = task.pushed(task.desired(robot, t))
         self._write(desired, target, task._held, gains)
+        self._timed = task.moves(t)
 
     def _write(self, desired: Any, target: Any, held: object, gains: Any) -> None:
         tick, rows = self._tick, self.rows
+        before = self._turning.copy() if self.remembers[0] else None
         if gains is not self.gains:
             tick.kp[rows], tick.kv[rows] = gains.kp, gains.kv
             limited = gains.max_speed is not None
@@ -269,8 +298,10 @@ class Packed:
             tick.goal[rows, 0], tick.goal[rows, 1], tick.goal[rows, 2] = desired
         else:
             self._pack_goal(desired)
+        way = self.way_round
+        if before is not None and way is not None and way.jumps(before, self._turning):
+            self.forget()
         self.target, self.held, self.gains = target, held, gains
-        self._timed = callable(target.goal)
 
     def _pack_goal(self, desired: Any) -> None:
         number, quantity = self._tick.numbers[self.index], self._tick.kind[self.index, QUANTITY]

@@ -142,14 +142,18 @@ class Plan:
         self, before: Plan | None, members: tuple[Member, ...], variables: list[Member | Variable]
     ) -> None:
         groups = {} if before is None else before.groups()
-        turned = [] if before is None else [p for p in before.packed if p.turn is not None]
-        known = {packed.member: packed for packed in turned}
+        known = {} if before is None else {p.member: p for p in before.packed}
         self.members, self.variables = members, variables
         self.tick.group[:] = [groups.get(v, 0) for v in variables]
         for packed, member in zip(self.packed, members, strict=True):
             packed.member = member
-            if packed.turn is not None:
-                packed.remember(known.get(member))
+            packed.remember(known.get(member))
+        self.seen = None  # a target may have gone on meanwhile
+
+    def forget_ways(self) -> None:
+        """Let all angles take the short way at the next tick."""
+        for packed in self.packed:
+            packed.forget()
 
     def leave(self, members: Sequence[Member], blending: Blending) -> None:
         """Let the readable form go on with these tasks where this plan was at the tick before."""
@@ -170,6 +174,7 @@ class Plan:
         ]
         for packed in self.packed:
             packed.come_back()
+        self.seen = None
 
     def _pack(self, scales: Scales) -> list[Packed]:
         packed: list[Packed] = []

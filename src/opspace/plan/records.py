@@ -138,6 +138,7 @@ TICK = RecordTable(
     _tuned("kind", ("tasks", KIND_SIZE), "a task as whole numbers", dtype=_INT),
     _tuned("numbers", ("tasks", NUMBERS_SIZE), "a task as numbers"),
     _plan("coordinate", ("rows",), "coordinate of each row of a joint task", dtype=_INT),
+    _plan("endless", ("rows",), "whether that joint turns without end", dtype=_INT),
     _plan("select", ("rows", 6), "what a row selects of a motion"),
     _refresh("goal", ("rows", 3), "q, v, a that joint tasks want", "rad, rad/s, rad/s²"),
     _refresh("kp", ("rows",), "gain on the error", "1/s²"),

@@ -64,7 +64,7 @@ class AdapterBase(ABC):
         self._v_view = _view(self._v)
         # Writing through these takes half the time, and refuses every shape and kind but their own.
         self._q_memory, self._v_memory = self._q.data, self._v.data
-        self._cache: dict[tuple[str, int], np.ndarray] = {}
+        self._cache: dict[tuple[str, int | str], np.ndarray] = {}
         self._behind = False
 
     def __repr__(self) -> str:
@@ -177,23 +177,23 @@ class AdapterBase(ABC):
         except KeyError:
             raise unknown_name(f"frame of {self.name}", name, self.frame_names) from None
 
-    def position(self, frame: int) -> np.ndarray:
+    def position(self, frame: int | str) -> np.ndarray:
         """Return the frame's origin in world axes, (3,) m."""
         return self._cached("position", frame, self._position)
 
-    def rotation(self, frame: int) -> np.ndarray:
+    def rotation(self, frame: int | str) -> np.ndarray:
         """Return R_world_frame, (3, 3)."""
         return self._cached("rotation", frame, self._rotation)
 
-    def jacobian(self, frame: int) -> np.ndarray:
+    def jacobian(self, frame: int | str) -> np.ndarray:
         """Return J of the frame's origin in world axes, (6, nv), linear rows first."""
         return self._cached("jacobian", frame, self._jacobian)
 
-    def velocity(self, frame: int) -> np.ndarray:
+    def velocity(self, frame: int | str) -> np.ndarray:
         """Return J v, (6,) m/s and rad/s."""
         return self._cached("velocity", frame, lambda f: self.jacobian(f) @ self._v)
 
-    def drift(self, frame: int) -> np.ndarray:
+    def drift(self, frame: int | str) -> np.ndarray:
         """Return Jdot v, (6,) m/s² and rad/s²."""
         return self._cached("drift", frame, self._drift)
 
@@ -257,15 +257,34 @@ class AdapterBase(ABC):
     @abstractmethod
     def _com_drift(self, _: int) -> np.ndarray: ...
 
-    def _cached(self, what: str, frame: int, compute: Callable[[int], np.ndarray]) -> np.ndarray:
+    def _cached(
+        self, what: str, frame: int | str, compute: Callable[[int], np.ndarray]
+    ) -> np.ndarray:
         key = (what, frame)
         value = self._cache.get(key)
         if value is None:
+            frame = self._known(frame)
             self.catch_up()
             value = compute(frame)
             value.setflags(write=False)
             self._cache[key] = value
         return value
+
+    def _known(self, frame: int | str) -> int:
+        """Return the id of a frame that is given by its id or, as people do, by its name.
+
+        Raises:
+            InputError: No frame has this id.
+            UnknownNameError: No frame has this name.
+        """
+        if isinstance(frame, str):
+            return self.frame_id(frame)
+        if not isinstance(frame, int | np.integer) or not 0 <= frame < len(self.frame_names):
+            raise InputError(
+                f"{self.name} has frames 0 to {len(self.frame_names) - 1}, not {frame!r}: "
+                "frame_id(name) gives the id of a name"
+            )
+        return int(frame)
 
     def check_state(self, q: np.ndarray, v: np.ndarray) -> None:
         """Check a state.

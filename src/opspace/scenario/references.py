@@ -123,6 +123,7 @@ def _there_and_back(
     return Chain(
         (0.0, move(near, far, target.out_duration, target.start_time)),
         (back, move(far, near, target.back_duration, back)),
+        start_time=0.0,
     )
 
 
@@ -155,7 +156,8 @@ def _via_points(target: targets.ViaPointsEntry, space: Values) -> Reference:
         points = [space.read(point) for point in target.points]
     else:
         points = [space.shift(space.start, offset) for offset in target.offsets or ()]
-    return ViaPoints((target.start_time, *target.times), [space.start, *points])
+    times = (target.start_time, *target.times)
+    return ViaPoints(times, [space.start, *points], start_time=0.0)
 
 
 def _swing(target: targets.SwingEntry, space: Values) -> Reference:

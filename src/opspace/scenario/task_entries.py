@@ -41,6 +41,12 @@ BlockStiffness = Annotated[float, Number("1/s²", at_least=0.0)]
 LinearSpeed = Annotated[float, Number("m/s", above=0.0)]
 AngularSpeed = Annotated[float, Number("rad/s", above=0.0)]
 JointSpeed = Annotated[float, Number("rad/s or m/s", above=0.0)]
+LinearAcceleration = Annotated[float, Number("m/s²", above=0.0)]
+AngularAcceleration = Annotated[float, Number("rad/s²", above=0.0)]
+JointAcceleration = Annotated[float, Number("rad/s² or m/s²", above=0.0)]
+PoseAccelerations = Annotated[
+    tuple[float, ...], Number("linear m/s², angular rad/s²", above=0.0, size=2)
+]
 PoseSpeeds = Annotated[tuple[float, ...], Number("linear m/s, angular rad/s", above=0.0, size=2)]
 
 _TARGET = "value or reference to follow; null holds the value at the start"
@@ -128,13 +134,16 @@ _CONTROLLED: Mapping[str, Mapping[str, _Argument]] = {
     controls: {
         "target": _Argument(_nullable(target), _TARGET),
         "max_speed": _Argument(_nullable(speed), f"{words}; null is no limit"),
+        "max_acceleration": _Argument(
+            _nullable(acceleration), "acceleration of the way to a new target; null is no way"
+        ),
     }
-    for controls, target, speed, words in (
-        ("position", PointTarget, LinearSpeed, f"{_SPEED} [m/s]"),
-        ("orientation", OrientationTarget, AngularSpeed, f"{_SPEED} [rad/s]"),
-        ("pose", PoseTarget, PoseSpeeds, "speeds that the error may ask for [m/s, rad/s]"),
-        ("joint", JointTarget, JointSpeed, f"{_SPEED} [rad/s or m/s]"),
-        ("joints", PostureTarget, JointSpeed, f"norm of the {_SPEED} [rad/s]"),
+    for controls, target, speed, acceleration, words in (
+        ("position", PointTarget, LinearSpeed, LinearAcceleration, f"{_SPEED} [m/s]"),
+        ("orientation", OrientationTarget, AngularSpeed, AngularAcceleration, f"{_SPEED} [rad/s]"),
+        ("pose", PoseTarget, PoseSpeeds, PoseAccelerations, f"{_SPEED} [m/s, rad/s]"),
+        ("joint", JointTarget, JointSpeed, JointAcceleration, f"{_SPEED} [rad/s or m/s]"),
+        ("joints", PostureTarget, JointSpeed, JointAcceleration, f"norm of the {_SPEED} [rad/s]"),
     )
 }
 _ALWAYS = ("self", "name", *TaskEntry.model_fields)

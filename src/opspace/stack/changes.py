@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from numbers import Real
 from typing import NamedTuple
 
@@ -53,6 +53,13 @@ class Request(ABC):
     """Something asked of a stack."""
 
     timing: Timing
+
+    def later(self, pause: float) -> Request:
+        """Return the same, so much later [s] if it has a time at which it starts."""
+        start = self.timing.start_time
+        if start is None:
+            return self
+        return replace(self, timing=replace(self.timing, start_time=start + pause))
 
     @abstractmethod
     def check(self, known: dict[str, Known]) -> None:

@@ -35,6 +35,10 @@ class Variable:
         name, *numbers = self.ramp
         return ramp(t, PROFILES.index(name), *numbers)
 
+    def wait(self, pause: float) -> None:
+        """Stand still for so long, s."""
+        self.ramp = self.ramp._replace(start_time=self.ramp.start_time + pause)
+
     def idle(self, t: float) -> bool:
         """Tell whether it has had no effect up to time ``t`` [s] and may be forgotten."""
         return self.value(t) == 0.0
@@ -87,6 +91,11 @@ class Member:
     def leaving(self) -> bool:
         """Whether it is on its way out."""
         return self.presence.target == 0.0
+
+    @property
+    def variables(self) -> tuple[Variable, ...]:
+        """The activations in time that it depends on; a swap has one for both tasks."""
+        return (self.presence, *(p.arrival for p in self.places if p.arrival is not None))
 
     @property
     def goal(self) -> int:

@@ -274,6 +274,10 @@ class Stack:
         """
         self._transitions.foresee(foresee)
 
+    def resume(self) -> None:
+        """Let the next tick go on as if there had been no pause; see `opspace.Controller.restart`."""
+        self._transitions.resume()
+
     def begin_tick(self, t: float) -> tuple[Member, ...]:
         """Start what is due at time ``t`` [s], drop what has left, and return the tasks there are.
 

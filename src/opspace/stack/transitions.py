@@ -40,6 +40,7 @@ class Transitions:
         # Nothing happens to the stack before this time, unless something new is asked.
         self._next = -math.inf
         self._asked = False
+        self._resuming = False
         # One request at a time is prepared, which takes long; the other lock is held briefly.
         self._requesting = RLock()
         self._lock = Lock()
@@ -142,10 +143,12 @@ class Transitions:
         if t < self._next and not self._asked:
             self._now = t
             return self._ticked
-        if self._lock.acquire(blocking=False):
+        if self._lock.acquire(blocking=self._resuming):  # which no tick can go on without
             try:
                 self._asked = False
-                if self._now is not None:
+                if self._resuming:
+                    self._resume(t)
+                elif self._now is not None:
                     self._period = t - self._now
                 started = bool(self._queue) and self._start_due(t)
                 if self._settle(t) or started:
@@ -154,6 +157,25 @@ class Transitions:
                 self._lock.release()
         self._now = t
         return self._ticked
+
+    def resume(self) -> None:
+        """Let the next tick go on as if no time had passed since the one before."""
+        self._resuming = self._asked = True
+
+    def _resume(self, t: float) -> None:
+        """Move everything that has a time on by the pause, and let tasks find anew what they hold."""
+        self._resuming = False
+        if self._now is None:
+            return
+        pause = t - self._now
+        variables = {id(v): v for m in self._members.values() for v in m.variables}
+        for variable in variables.values():
+            variable.wait(pause)
+        self._queue = [_Queued(q.order + pause, q.request.later(pause)) for q in self._queue]
+        self._now = t
+        self._ticked = tuple(self._members.values())  # another object: its ramps have changed
+        for member in self._ticked:
+            member.task.resume(pause)
 
     def _change(self) -> None:
         members = tuple(self._members.values())

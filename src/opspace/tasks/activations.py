@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from opspace.errors import InputError, unknown_name
 from opspace.law import Buffer
+from opspace.tasks.joint_layout import joint_layout
 from opspace.tasks.validation import finite_array, shown
 
 if TYPE_CHECKING:
@@ -21,6 +22,9 @@ if TYPE_CHECKING:
 class JointBuffer:
     """Activation by the position of a joint of one degree of freedom, see `opspace.Buffer`.
 
+    Of a joint that turns without end whole turns make no difference: the task is there on the half of
+    the circle beyond ``on`` and absent on the half beyond ``off``, with a rise at either end.
+
     Args:
         joint: Name of the joint.
         off: Position at and beyond which the task is absent, rad or m.
@@ -28,22 +32,41 @@ class JointBuffer:
         profile: Name of the profile.
 
     Raises:
-        InputError: The two positions coincide or are not finite.
+        InputError: The two positions coincide or are not finite; at binding, they are half a turn
+            or more apart on a joint that turns without end.
         UnknownNameError: An unknown profile; at binding an unknown joint.
     """
 
     def __init__(self, joint: str, off: float, on: float, profile: str = "quintic") -> None:
         self.joint = joint
         self.buffer = Buffer(off, on, profile)
+        self._endless: bool | None = None
 
     def bind(self, robot: Robot) -> None:
-        """Check that the robot has the joint."""
+        """Check that the robot has the joint, and see whether it turns without end."""
         if self.joint not in robot.joint_names:
             raise unknown_name("joint", self.joint, robot.joint_names)
+        self._endless = bool(joint_layout(robot, [self.joint]).endless[0])
+        if self._endless and abs(self.buffer.on - self.buffer.off) >= math.pi:
+            raise InputError(
+                f"joint {self.joint!r} turns without end: off={self.buffer.off:g} and "
+                f"on={self.buffer.on:g} must be less than half a turn apart"
+            )
 
     def __call__(self, robot: Robot, t: float) -> float:
         """Evaluate the activation at the robot's present state."""
-        return self.buffer(float(robot.q[robot.joint_names.index(self.joint)])).value
+        if self._endless is None:
+            self.bind(robot)
+        position = float(robot.q[robot.joint_names.index(self.joint)])
+        return self.buffer(self._folded(position) if self._endless else position).value
+
+    def _folded(self, position: float) -> float:
+        """Fold the far half of the circle onto the near one, about the middle of the buffer."""
+        middle = 0.5 * (self.buffer.off + self.buffer.on)
+        away = math.remainder(position - middle, 2.0 * math.pi)
+        if abs(away) > 0.5 * math.pi:
+            away = math.copysign(math.pi - abs(away), away)
+        return middle + away
 
 
 class DistanceBuffer:

@@ -20,6 +20,10 @@ class ComTask(MotionTask):
         kv: Damping, a number or one per selected axis, 1/s; None is critical, 2 sqrt(kp).
         axes: World axes to control, some of "xyz".
         max_speed: Speed that the position error may ask for, m/s.
+        max_acceleration: Acceleration of the way to a new target, m/s²; see
+            `TrackingTask.max_acceleration`.
+        ki: Integral gain, 1/s³, against friction and payload; None is none.
+        max_integral: Error in m or rad whose pull, kp times it, the integral may add at most.
         name: Name of the task.
 
     Raises:
@@ -34,6 +38,9 @@ class ComTask(MotionTask):
         kv: ArrayLike | None = None,
         axes: str = "xyz",
         max_speed: float | None = None,
+        max_acceleration: float | None = None,
+        ki: float | None = None,
+        max_integral: float = 0.05,
         name: str = "com",
     ) -> None:
         super().__init__(
@@ -46,4 +53,7 @@ class ComTask(MotionTask):
             kp=kp,
             kv=kv,
             max_speed=max_speed,
+            max_acceleration=max_acceleration,
+            ki=ki,
+            max_integral=max_integral,
         )

@@ -24,6 +24,8 @@ class Gains:
         critical: Whether kv follows kp as 2 sqrt(kp).
         max_speed: Speed limit of each group of rows, m/s or rad/s; None where there is none.
         groups: Rows that share a speed limit.
+        max_acceleration: Acceleration of the way to a new target, of each group, m/s² or rad/s²; None
+            where the target is followed at once.
     """
 
     kp: Array
@@ -31,6 +33,7 @@ class Gains:
     critical: bool
     max_speed: tuple[float, ...] | None
     groups: tuple[slice, ...]
+    max_acceleration: tuple[float, ...] | None = None
 
     def acceleration(self, error: Array, velocity_error: Array, feedforward: Array) -> Array:
         """Return the commanded acceleration of Eq. 24: f* = a_d + kv (v_d − ẋ) + kp (x_d − x).
@@ -49,6 +52,16 @@ class Gains:
         if self.max_speed is not None:
             error = self._within_speed(error, self.max_speed)
         return feedforward + self.kv * velocity_error + self.kp * error
+
+    def saturates(self, error: Array) -> bool:
+        """Tell whether a position error (m,) asks for more than the speed limit."""
+        if self.max_speed is None:
+            return False
+        asked = speed_per_error(self.kp, self.kv) * error
+        return any(
+            math.hypot(*asked[rows]) > limit
+            for rows, limit in zip(self.groups, self.max_speed, strict=True)
+        )
 
     def _within_speed(self, error: Array, max_speed: tuple[float, ...]) -> Array:
         # kv v_sat = kp (scale · error): scaling the error saturates the speed it asks for.
@@ -69,6 +82,7 @@ def make_gains(
     kv: ArrayLike | None,
     max_speed: float | Sequence[float] | None,
     *,
+    max_acceleration: float | Sequence[float] | None = None,
     rows: int,
     groups: tuple[slice, ...],
     owner: str,
@@ -79,6 +93,8 @@ def make_gains(
         kp: Stiffness, a number or (m,), 1/s².
         kv: Damping, a number or (m,), 1/s; None is critical damping, 2 sqrt(kp).
         max_speed: Speed limit, one for each group, m/s or rad/s; None for no limit.
+        max_acceleration: Acceleration of the way to a new target, one for each group, m/s² or rad/s²;
+            None for no way.
         rows: m, or 0 while it is not known.
         groups: Rows that share a speed limit.
         owner: Name of the task, for the error message.
@@ -96,10 +112,44 @@ def make_gains(
         raise InputError(
             f"task {owner!r}: kp has {stiffness.size} numbers but kv has {damping.size}"
         )
-    limits = None if max_speed is None else _speeds(max_speed, len(groups), owner)
+    limits = _limits(max_speed, "max_speed", len(groups), owner)
+    accelerations = paced(max_acceleration, limits, len(groups), owner)
     if limits is not None and np.any((stiffness > 0.0) & (damping == 0.0)):
         raise InputError(f"task {owner!r}: max_speed needs kv above zero wherever kp is")
-    return Gains(stiffness, damping, kv is None, limits, groups)
+    return Gains(stiffness, damping, kv is None, limits, groups, accelerations)
+
+
+def paced(
+    max_acceleration: float | Sequence[float] | None,
+    max_speed: tuple[float, ...] | None,
+    count: int,
+    owner: str,
+) -> tuple[float, ...] | None:
+    """Check the accelerations of the ways to new targets, which go with speeds.
+
+    Args:
+        max_acceleration: One for each group, m/s² or rad/s²; None for no way.
+        max_speed: Speed limit of each group, checked.
+        count: Number of groups.
+        owner: Name of the task, for the error message.
+
+    Returns:
+        The accelerations.
+
+    Raises:
+        InputError: An acceleration that is none, or a speed that is missing or not finite.
+    """
+    found = _limits(max_acceleration, "max_acceleration", count, owner)
+    if found is not None and not all(
+        math.isfinite(x) for x in (*found, *(max_speed or (math.inf,)))
+    ):
+        raise InputError(f"task {owner!r}: max_acceleration needs max_speed, both finite")
+    return found
+
+
+def one_or_all(limits: tuple[float, ...] | None) -> float | tuple[float, ...] | None:
+    """Return the limits of all groups, as a number where there is one."""
+    return limits[0] if limits is not None and len(limits) == 1 else limits
 
 
 def _gain(value: ArrayLike, what: str, rows: int, owner: str) -> Array:
@@ -111,10 +161,14 @@ def _gain(value: ArrayLike, what: str, rows: int, owner: str) -> Array:
     return gain
 
 
-def _speeds(value: float | Sequence[float], count: int, owner: str) -> tuple[float, ...]:
-    speeds = tuple(numbers(value, f"task {owner!r}: max_speed").reshape(-1).tolist())
-    if len(speeds) != count:
-        raise InputError(f"task {owner!r}: max_speed needs {count} number(s), not {len(speeds)}")
-    if not all(speed > 0.0 for speed in speeds):
-        raise InputError(f"task {owner!r}: max_speed must be above zero, not {list(speeds)}")
-    return speeds
+def _limits(
+    value: float | Sequence[float] | None, what: str, count: int, owner: str
+) -> tuple[float, ...] | None:
+    if value is None:
+        return None
+    limits = tuple(numbers(value, f"task {owner!r}: {what}").reshape(-1).tolist())
+    if len(limits) != count:
+        raise InputError(f"task {owner!r}: {what} needs {count} number(s), not {len(limits)}")
+    if not all(limit > 0.0 for limit in limits):
+        raise InputError(f"task {owner!r}: {what} must be above zero, not {list(limits)}")
+    return limits

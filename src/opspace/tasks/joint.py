@@ -26,6 +26,10 @@ class JointTask(PostureTask):
         kp: Stiffness, 1/s².
         kv: Damping, 1/s; None is critical, 2 sqrt(kp).
         max_speed: Speed that the error may ask for, rad/s or m/s.
+        max_acceleration: Acceleration of the way to a new target, rad/s² or m/s²; see
+            `TrackingTask.max_acceleration`.
+        ki: Integral gain, 1/s³, against friction and payload; None is none.
+        max_integral: Error in m or rad whose pull, kp times it, the integral may add at most.
         name: Name of the task; None is the name of the joint.
 
     Raises:
@@ -40,6 +44,9 @@ class JointTask(PostureTask):
         kp: float = 100.0,
         kv: float | None = None,
         max_speed: float | None = None,
+        max_acceleration: float | None = None,
+        ki: float | None = None,
+        max_integral: float = 0.05,
         name: str | None = None,
     ) -> None:
         super().__init__(
@@ -48,6 +55,9 @@ class JointTask(PostureTask):
             kv=kv,
             joints=[joint],
             max_speed=max_speed,
+            max_acceleration=max_acceleration,
+            ki=ki,
+            max_integral=max_integral,
             name=joint if name is None else name,
         )
 

@@ -31,6 +31,7 @@ class Layout:
         drift: (m,) zeros, read-only.
         names: (m,) names of the coordinates.
         units: (m,) "rad" or "m".
+        endless: (m,) whether the joint turns without end, so that whole turns make no difference.
     """
 
     coordinates: np.ndarray
@@ -41,6 +42,7 @@ class Layout:
     drift: Array
     names: tuple[str, ...]
     units: tuple[str, ...]
+    endless: np.ndarray
 
     def select(self, values: Array, what: str) -> Array:
         """Return the entries of the chosen joints, quaternions normalised.
@@ -112,6 +114,7 @@ def joint_layout(robot: Robot, joints: Sequence[str] | None) -> Layout:
         drift=drift,
         names=tuple(robot.joint_names[i] for i in coordinates),
         units=tuple(units[i] for i in coordinates),
+        endless=np.isin(coordinates, endless_joints(robot, places)),
     )
 
 
@@ -136,6 +139,42 @@ def configuration_places(robot: Robot) -> list[tuple[int, ...]]:
     # share an entry share all of theirs.
     whole = [set().union(*(other for other in moved if other & own)) for own in moved]
     return [tuple(sorted(entries)) for entries in whole]
+
+
+def endless_joints(robot: Robot, places: Sequence[tuple[int, ...]]) -> list[int]:
+    """Find the joints without limits that a full turn brings back to where they were.
+
+    They are found by turning them, which tells a hinge from a slide and from one that others follow
+    at half its rate.
+
+    Args:
+        robot: The robot; its state is not touched.
+        places: What `configuration_places` gives.
+
+    Returns:
+        Indices in v.
+    """
+    unlimited = np.isneginf(robot.q_lower) & np.isposinf(robot.q_upper)
+    candidates = [i for i in np.flatnonzero(unlimited).tolist() if len(places[i]) == 1]
+    if not candidates:
+        return []
+    moved = robot.fresh()
+    before = _where(moved, robot.q_reference)
+    found: list[int] = []
+    for i in candidates:
+        q = robot.q_reference.copy()
+        q[places[i][0]] += 2.0 * math.pi
+        if np.allclose(_where(moved, q), before, rtol=0.0, atol=1e-9):
+            found.append(i)
+    return found
+
+
+def _where(robot: Robot, q: Array) -> Array:
+    """Return the place of every frame, and of the centre of mass, in one array."""
+    robot.update(q, np.zeros(robot.nv))
+    frames = range(len(robot.frame_names))
+    places = [robot.com_position(), *(robot.position(f) for f in frames)]
+    return np.concatenate([*places, *(robot.rotation(f).ravel() for f in frames)])
 
 
 def _chosen(robot: Robot, joints: Sequence[str] | None) -> list[int]:

@@ -2,38 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from types import MappingProxyType
 from typing import TYPE_CHECKING
 
-import numpy as np
 from numpy.typing import ArrayLike
 
 from opspace.errors import InputError
 from opspace.tasks.motion_task import MotionTask
 from opspace.tasks.motions import CenterOfMass, WorldFrame
 from opspace.tasks.quantities import Orientation, Pose, Position
-from opspace.tasks.references import (
-    JerkLimited,
-    OrientationJerkLimited,
-    PoseReference,
-    Reference,
-    Sample,
-)
+from opspace.tasks.references import Sample
+from opspace.tasks.rotation import as_rotation, homogeneous
 from opspace.tasks.task import Task
+from opspace.tasks.validation import Array, finite_array
+from opspace.tasks.ways import Pace, PoseWay, RotationWay, VectorWay
 
 if TYPE_CHECKING:
     from opspace.robots.protocol import Robot
 
-MOVING: Mapping[str, float] = MappingProxyType(
-    {"max_velocity": 0.6, "max_acceleration": 3.0, "max_jerk": 30.0}
-)
-"""Limits of the way to a position, m/s, m/s², m/s³."""
+MOVING = Pace(0.6, 3.0)
+"""Limits of the way to a position, m/s, m/s²."""
 
-TURNING: Mapping[str, float] = MappingProxyType(
-    {"max_velocity": 1.5, "max_acceleration": 8.0, "max_jerk": 80.0}
-)
-"""Limits of the way to an orientation, rad/s, rad/s², rad/s³."""
+TURNING = Pace(1.5, 8.0)
+"""Limits of the way to an orientation, rad/s, rad/s²."""
 
 
 def can_be_led(task: Task) -> bool:
@@ -68,44 +58,28 @@ def lead(
         raise InputError(f"task {task.name!r} has no target in the world that could be led")
     now, quantity = task.desired(robot, t), task.quantity
     if isinstance(quantity, Pose):
-        task.target = _pose(now, t, *_goals(task, now, position, orientation))
+        goal = _goal(task, now, position, orientation)
+        task.target = PoseWay(now, goal, t, MOVING, TURNING)
     elif isinstance(quantity, Position) and position is not None and orientation is None:
-        task.target = _position(now, t, position)
+        task.target = VectorWay(now, finite_array(position, (3,), _goal_of(task)), t, MOVING)
     elif isinstance(quantity, Orientation) and orientation is not None and position is None:
-        task.target = _orientation(now, t, orientation)
+        task.target = RotationWay(now, as_rotation(orientation, _goal_of(task)), t, TURNING)
     else:
         takes = "a position" if isinstance(quantity, Position) else "an orientation"
         raise InputError(f"task {task.name!r} is led to {takes} and nothing else")
 
 
-def _position(now: Sample, t: float, goal: ArrayLike) -> JerkLimited:
-    return JerkLimited(
-        now.x, goal, **MOVING, start_time=t, start_velocity=now.v, start_acceleration=now.a
-    )
-
-
-def _orientation(now: Sample, t: float, goal: ArrayLike) -> OrientationJerkLimited:
-    return OrientationJerkLimited(
-        now.x, goal, **TURNING, start_time=t, start_velocity=now.v, start_acceleration=now.a
-    )
-
-
-def _goals(
+def _goal(
     task: MotionTask, now: Sample, position: ArrayLike | None, orientation: ArrayLike | None
-) -> tuple[ArrayLike, ArrayLike]:
+) -> Array:
     """Fill in the goals that are kept: those of a way that is being led, or where the target is."""
-    led, kept = task.target, (now.x[:3, 3], now.x[:3, :3])
-    if isinstance(led, PoseReference):
-        ways = (led.position, led.orientation)
-        if isinstance(ways[0], JerkLimited) and isinstance(ways[1], OrientationJerkLimited):
-            kept = (ways[0].goal, ways[1].goal)
-    return (
-        kept[0] if position is None else position,
-        np.array(kept[1]) if orientation is None else orientation,
+    kept = task.target.goal if isinstance(task.target, PoseWay) else now.x
+    what = _goal_of(task)
+    return homogeneous(
+        kept[:3, 3] if position is None else finite_array(position, (3,), what),
+        kept[:3, :3] if orientation is None else as_rotation(orientation, what),
     )
 
 
-def _pose(now: Sample, t: float, position: ArrayLike, orientation: ArrayLike) -> Reference:
-    linear = Sample(now.x[:3, 3], now.v[:3], now.a[:3])
-    angular = Sample(now.x[:3, :3], now.v[3:], now.a[3:])
-    return PoseReference(_position(linear, t, position), _orientation(angular, t, orientation))
+def _goal_of(task: MotionTask) -> str:
+    return f"task {task.name!r}: goal"

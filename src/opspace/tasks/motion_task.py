@@ -16,6 +16,7 @@ from opspace.tasks.rotation import cross
 from opspace.tasks.task import TaskTerms
 from opspace.tasks.tracking import TrackingTask
 from opspace.tasks.validation import Array
+from opspace.tasks.ways import Way
 
 if TYPE_CHECKING:
     from opspace.robots.protocol import Robot
@@ -54,6 +55,9 @@ class MotionTask(TrackingTask):
         kp: ArrayLike,
         kv: ArrayLike | None,
         max_speed: float | Sequence[float] | None,
+        max_acceleration: float | Sequence[float] | None = None,
+        ki: float | None = None,
+        max_integral: float = 0.05,
     ) -> None:
         if axes_frame not in ("world", "tool"):
             raise InputError(
@@ -68,6 +72,9 @@ class MotionTask(TrackingTask):
             kp=kp,
             kv=kv,
             max_speed=max_speed,
+            max_acceleration=max_acceleration,
+            ki=ki,
+            max_integral=max_integral,
         )
         self.source = source
         self.quantity = quantity
@@ -80,7 +87,7 @@ class MotionTask(TrackingTask):
         self._require_bound(robot)
         quantity, block = self.quantity, self.quantity.block
         motion = self.source.measure(robot)
-        desired = self.desired(robot, t)
+        desired = self.pushed(self.desired(robot, t))
         error = quantity.error(motion, desired.x)
         basis, drift = self.selection, motion.drift[block]
         if self.in_tool_axes:
@@ -120,6 +127,16 @@ class MotionTask(TrackingTask):
 
     def _resolve(self, robot: Robot) -> None:
         self.source.bind(robot)
+
+    def _basis(self, robot: Robot) -> Array:
+        size = len(self.quantity.units)
+        if not self.in_tool_axes:
+            return self.selection
+        return self.selection @ _tool_axes(self.source.measure(robot).rotation)[:size, :size]
+
+    def _way(self, now: Sample, goal: Array, t: float) -> Way:
+        groups = range(len(self._speed_groups))
+        return self.quantity.way(now, goal, t, [self._pace(group) for group in groups])
 
     def _check_value(self, value: ArrayLike, what: str) -> Array:
         return self.quantity.check(value, what)

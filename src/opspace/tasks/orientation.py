@@ -25,6 +25,10 @@ class OrientationTask(MotionTask):
         axes: Axes to turn about, some of "xyz".
         axes_frame: Whether these are the axes of the world or of the frame ("tool").
         max_speed: Speed that the orientation error may ask for, rad/s.
+        max_acceleration: Acceleration of the way to a new target, rad/s²; see
+            `TrackingTask.max_acceleration`.
+        ki: Integral gain, 1/s³, against friction and payload; None is none.
+        max_integral: Error in m or rad whose pull, kp times it, the integral may add at most.
         name: Name of the task.
 
     Raises:
@@ -41,6 +45,9 @@ class OrientationTask(MotionTask):
         axes: str = "xyz",
         axes_frame: AxesFrame = "world",
         max_speed: float | None = None,
+        max_acceleration: float | None = None,
+        ki: float | None = None,
+        max_integral: float = 0.05,
         name: str = "orientation",
     ) -> None:
         super().__init__(
@@ -53,4 +60,7 @@ class OrientationTask(MotionTask):
             kp=kp,
             kv=kv,
             max_speed=max_speed,
+            max_acceleration=max_acceleration,
+            ki=ki,
+            max_integral=max_integral,
         )

@@ -26,6 +26,10 @@ class PoseTask(MotionTask):
         kp_angular: Stiffness of the three angular rows in place of ``kp``.
         axes_frame: Whether the rows are along the axes of the world or of the frame ("tool").
         max_speed: Speeds that the error may ask for, (linear m/s, angular rad/s); inf is none.
+        max_acceleration: Accelerations of the way to a new target, (linear m/s², angular rad/s²); see
+            `TrackingTask.max_acceleration`.
+        ki: Integral gain, 1/s³, against friction and payload; None is none.
+        max_integral: Error in m or rad whose pull, kp times it, the integral may add at most.
         offset: (3,) point to control in the frame's axes, m; None is the frame's origin.
         name: Name of the task.
 
@@ -44,6 +48,9 @@ class PoseTask(MotionTask):
         kp_angular: float | None = None,
         axes_frame: AxesFrame = "world",
         max_speed: tuple[float, float] | None = None,
+        max_acceleration: tuple[float, float] | None = None,
+        ki: float | None = None,
+        max_integral: float = 0.05,
         offset: ArrayLike | None = None,
         name: str = "pose",
     ) -> None:
@@ -57,6 +64,9 @@ class PoseTask(MotionTask):
             kp=pose_stiffness(kp, kp_linear, kp_angular, name),
             kv=kv,
             max_speed=max_speed,
+            max_acceleration=max_acceleration,
+            ki=ki,
+            max_integral=max_integral,
         )
 
 

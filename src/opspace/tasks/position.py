@@ -22,6 +22,10 @@ class PositionTask(MotionTask):
         axes: Axes to control, some of "xyz".
         axes_frame: Whether these are the axes of the world or of the frame ("tool").
         max_speed: Speed that the position error may ask for, m/s.
+        max_acceleration: Acceleration of the way to a new target, m/s²; see
+            `TrackingTask.max_acceleration`.
+        ki: Integral gain, 1/s³, against friction and payload; None is none.
+        max_integral: Error in m or rad whose pull, kp times it, the integral may add at most.
         offset: (3,) point to control in the frame's axes, m; None is the frame's origin.
         name: Name of the task.
 
@@ -39,6 +43,9 @@ class PositionTask(MotionTask):
         axes: str = "xyz",
         axes_frame: AxesFrame = "world",
         max_speed: float | None = None,
+        max_acceleration: float | None = None,
+        ki: float | None = None,
+        max_integral: float = 0.05,
         offset: ArrayLike | None = None,
         name: str = "position",
     ) -> None:
@@ -52,4 +59,7 @@ class PositionTask(MotionTask):
             kp=kp,
             kv=kv,
             max_speed=max_speed,
+            max_acceleration=max_acceleration,
+            ki=ki,
+            max_integral=max_integral,
         )

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from opspace.errors import InputError
 from opspace.tasks.motions import Motion
+from opspace.tasks.pose_forms import as_pose
+from opspace.tasks.references.sample import Sample
 from opspace.tasks.rotation import as_rotation, homogeneous
 from opspace.tasks.rotation_error import RotationError
-from opspace.tasks.validation import Array, finite_array, numbers
+from opspace.tasks.validation import Array, finite_array
+from opspace.tasks.ways import Pace, PoseWay, RotationWay, VectorWay, Way
 
 
 class Quantity(Protocol):
@@ -39,6 +42,10 @@ class Quantity(Protocol):
         """Return x_d − x, (k,)."""
         ...
 
+    def way(self, now: Sample, goal: Array, t: float, paces: Sequence[Pace]) -> Way:
+        """Return the way from what is followed at time t to a value, one pace for each speed group."""
+        ...
+
     def reset(self) -> None:
         """Forget the past."""
         ...
@@ -63,12 +70,19 @@ class Position:
         """Return x_d − x, m."""
         return desired - motion.position
 
+    def way(self, now: Sample, goal: Array, t: float, paces: Sequence[Pace]) -> Way:
+        """Return the straight way."""
+        return VectorWay(now, goal, t, paces[0])
+
     def reset(self) -> None:
         """Do nothing: a position has no past."""
 
 
 class Orientation:
-    """Orientation R (3, 3): error R log(Rᵀ R_d) = log(R_d Rᵀ), kept continuous past half a turn."""
+    """Orientation R (3, 3): error R log(Rᵀ R_d) = log(R_d Rᵀ), kept continuous past half a turn.
+
+    It is continuous while R_d is; a target that jumps is turned to the short way.
+    """
 
     block = slice(3, 6)
     units: tuple[str, ...] = ("rad", "rad", "rad")
@@ -87,7 +101,12 @@ class Orientation:
 
     def error(self, motion: Motion, desired: Array) -> Array:
         """Return the rotation vector from R to R_d, rad."""
+        self.turn.follow(desired)
         return self.turn(desired @ motion.rotation.T)
+
+    def way(self, now: Sample, goal: Array, t: float, paces: Sequence[Pace]) -> Way:
+        """Return the turn about one axis."""
+        return RotationWay(now, goal, t, paces[0])
 
     def reset(self) -> None:
         """Forget which way round the error went."""
@@ -118,45 +137,10 @@ class Pose:
         turn = self._orientation.error(motion, desired[:3, :3])
         return np.concatenate((desired[:3, 3] - motion.position, turn))
 
+    def way(self, now: Sample, goal: Array, t: float, paces: Sequence[Pace]) -> Way:
+        """Return both ways."""
+        return PoseWay(now, goal, t, *paces)
+
     def reset(self) -> None:
         """Forget which way round the rotation error went."""
         self._orientation.reset()
-
-
-def as_pose(value: ArrayLike, what: str) -> Array:
-    """Read a pose.
-
-    Args:
-        value: (4, 4) homogeneous matrix, (7,) position and quaternion [x y z, qw qx qy qz], or a
-            pair (position, orientation) with the orientation as matrix or quaternion.
-        what: What the value is, at the start of the error message.
-
-    Returns:
-        (4, 4) homogeneous matrix with an orthonormal rotation, read-only.
-
-    Raises:
-        InputError: None of these forms, not finite, or not a rotation.
-    """
-    if isinstance(value, tuple | list) and len(value) == 2:
-        position, orientation = value
-    else:
-        position, orientation = _split(numbers(value, what), what)
-    pose = homogeneous(
-        finite_array(position, (3,), f"{what} position"),
-        as_rotation(orientation, f"{what} orientation"),
-    )
-    pose.flags.writeable = False
-    return pose
-
-
-def _split(given: Array, what: str) -> tuple[Array, Array]:
-    if given.shape == (7,):
-        return given[:3], given[3:]
-    if given.shape != (4, 4):
-        raise InputError(
-            f"{what} must be a (4, 4) matrix, seven numbers [x y z, qw qx qy qz] "
-            f"or a pair (position, orientation), not of shape {given.shape}"
-        )
-    if not np.array_equal(given[3], (0.0, 0.0, 0.0, 1.0)):
-        raise InputError(f"{what}: the last row of a (4, 4) pose must be 0 0 0 1")
-    return given[:3, 3], given[:3, :3]

@@ -26,6 +26,10 @@ class RelativePositionTask(MotionTask):
         kv: Damping, a number or one per selected axis, 1/s; None is critical, 2 sqrt(kp).
         axes: Axes of the reference frame to control, some of "xyz".
         max_speed: Speed that the position error may ask for, m/s.
+        max_acceleration: Acceleration of the way to a new target, m/s²; see
+            `TrackingTask.max_acceleration`.
+        ki: Integral gain, 1/s³, against friction and payload; None is none.
+        max_integral: Error in m or rad whose pull, kp times it, the integral may add at most.
         name: Name of the task.
 
     Raises:
@@ -42,6 +46,9 @@ class RelativePositionTask(MotionTask):
         kv: ArrayLike | None = None,
         axes: str = "xyz",
         max_speed: float | None = None,
+        max_acceleration: float | None = None,
+        ki: float | None = None,
+        max_integral: float = 0.05,
         name: str = "relative_position",
     ) -> None:
         super().__init__(
@@ -54,6 +61,9 @@ class RelativePositionTask(MotionTask):
             kp=kp,
             kv=kv,
             max_speed=max_speed,
+            max_acceleration=max_acceleration,
+            ki=ki,
+            max_integral=max_integral,
         )
 
 
@@ -71,6 +81,10 @@ class RelativeOrientationTask(MotionTask):
         kv: Damping, a number or one per selected axis, 1/s; None is critical, 2 sqrt(kp).
         axes: Axes of the reference frame to turn about, some of "xyz".
         max_speed: Speed that the orientation error may ask for, rad/s.
+        max_acceleration: Acceleration of the way to a new target, rad/s²; see
+            `TrackingTask.max_acceleration`.
+        ki: Integral gain, 1/s³, against friction and payload; None is none.
+        max_integral: Error in m or rad whose pull, kp times it, the integral may add at most.
         name: Name of the task.
 
     Raises:
@@ -87,6 +101,9 @@ class RelativeOrientationTask(MotionTask):
         kv: ArrayLike | None = None,
         axes: str = "xyz",
         max_speed: float | None = None,
+        max_acceleration: float | None = None,
+        ki: float | None = None,
+        max_integral: float = 0.05,
         name: str = "relative_orientation",
     ) -> None:
         super().__init__(
@@ -99,6 +116,9 @@ class RelativeOrientationTask(MotionTask):
             kp=kp,
             kv=kv,
             max_speed=max_speed,
+            max_acceleration=max_acceleration,
+            ki=ki,
+            max_integral=max_integral,
         )
 
 
@@ -117,6 +137,10 @@ class RelativePoseTask(MotionTask):
         kp_linear: Stiffness of the three linear rows in place of ``kp``.
         kp_angular: Stiffness of the three angular rows in place of ``kp``.
         max_speed: Speeds that the error may ask for, (linear m/s, angular rad/s); inf is none.
+        max_acceleration: Accelerations of the way to a new target, (linear m/s², angular rad/s²); see
+            `TrackingTask.max_acceleration`.
+        ki: Integral gain, 1/s³, against friction and payload; None is none.
+        max_integral: Error in m or rad whose pull, kp times it, the integral may add at most.
         name: Name of the task.
 
     Raises:
@@ -134,6 +158,9 @@ class RelativePoseTask(MotionTask):
         kp_linear: float | None = None,
         kp_angular: float | None = None,
         max_speed: tuple[float, float] | None = None,
+        max_acceleration: tuple[float, float] | None = None,
+        ki: float | None = None,
+        max_integral: float = 0.05,
         name: str = "relative_pose",
     ) -> None:
         super().__init__(
@@ -146,4 +173,7 @@ class RelativePoseTask(MotionTask):
             kp=pose_stiffness(kp, kp_linear, kp_angular, name),
             kv=kv,
             max_speed=max_speed,
+            max_acceleration=max_acceleration,
+            ki=ki,
+            max_integral=max_integral,
         )

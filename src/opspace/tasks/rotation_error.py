@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from opspace.law.scalars import goes_on
-from opspace.tasks.rotation import Quaternion, quaternion_from_matrix, rotation_vector
+from opspace.tasks.rotation import quaternion_from_matrix, rotation_vector
 from opspace.tasks.validation import Array
+from opspace.tasks.way_round import WayRound, rotation_jumps
 
 
-class RotationError:
+class RotationError(WayRound):
     """Logarithm of a rotation error that remembers which way round it went.
 
     The logarithm of SO(3) jumps from π to −π about its axis at half a turn. A controller that
@@ -20,8 +21,7 @@ class RotationError:
         previous: Quaternion wxyz of the last error, None without a past.
     """
 
-    def __init__(self) -> None:
-        self.previous: Quaternion | None = None
+    jumps = staticmethod(rotation_jumps)
 
     def __call__(self, E: Array) -> Array:
         """Return the rotation vector of the error E = R_d Rᵀ.
@@ -40,7 +40,3 @@ class RotationError:
                 q = (-q[0], -q[1], -q[2], -q[3])
         self.previous = q
         return rotation_vector(q)
-
-    def reset(self) -> None:
-        """Forget the past: the next error takes the short way."""
-        self.previous = None

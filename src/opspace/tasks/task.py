@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from numpy.typing import ArrayLike
 
 from opspace.errors import InputError
-from opspace.tasks.gains import make_gains
+from opspace.tasks.gains import Gains, make_gains, one_or_all
 from opspace.tasks.known_attributes import KnownAttributes
 from opspace.tasks.validation import Array, brief
 
@@ -121,6 +121,15 @@ class Task(KnownAttributes, ABC):
     def reset(self) -> None:
         """Forget what was remembered from earlier ticks, such as a held start value."""
 
+    def resume(self, pause: float) -> None:
+        """Go on after a pause, in which anything may have happened to the robot.
+
+        Args:
+            pause: How long it was, s.
+        """
+        del pause
+        self.reset()
+
     def row_axes(self, robot: Robot) -> Array | None:
         """Return the motion in world axes that each row is about, to be drawn.
 
@@ -155,8 +164,7 @@ class Task(KnownAttributes, ABC):
     @property
     def max_speed(self) -> float | tuple[float, ...] | None:
         """Speed that the position error may ask for, m/s or rad/s; None is no limit."""
-        speeds = self._gains.max_speed
-        return speeds[0] if speeds is not None and len(speeds) == 1 else speeds
+        return one_or_all(self._gains.max_speed)
 
     @max_speed.setter
     def max_speed(self, value: float | Sequence[float] | None) -> None:
@@ -167,8 +175,15 @@ class Task(KnownAttributes, ABC):
         self, kp: ArrayLike, kv: ArrayLike | None, max_speed: float | Sequence[float] | None
     ) -> None:
         # One record, assigned once: a tick in another thread sees the old gains or the new ones.
+        before: Gains | None = getattr(self, "_gains", None)
         self._gains = make_gains(
-            kp, kv, max_speed, rows=self.rows, groups=self._speed_groups, owner=self.name
+            kp,
+            kv,
+            max_speed,
+            max_acceleration=None if before is None else before.max_acceleration,
+            rows=self.rows,
+            groups=self._speed_groups,
+            owner=self.name,
         )
 
     def __repr__(self) -> str:
@@ -176,6 +191,8 @@ class Task(KnownAttributes, ABC):
         words = [repr(self.name), *self._words(), f"kp={brief(gains.kp)}, kv={brief(gains.kv)}"]
         if gains.max_speed is not None:
             words.append(f"max_speed={brief(gains.max_speed)}")
+        if gains.max_acceleration is not None:
+            words.append(f"max_acceleration={brief(gains.max_acceleration)}")
         return f"{type(self).__name__}({', '.join(words)})"
 
     def _words(self) -> list[str]:

@@ -5,16 +5,19 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from opspace.errors import InputError, UnknownNameError
-from opspace.tasks.references.sample import Reference, Sample
+from opspace.tasks.gains import one_or_all, paced
+from opspace.tasks.references.sample import Constant, Reference, Sample
+from opspace.tasks.references.start import begun
 from opspace.tasks.rotation import quaternion_from_matrix
 from opspace.tasks.task import Task, TaskTerms
-from opspace.tasks.validation import Array, brief, finite_array, shown
+from opspace.tasks.validation import Array, brief, finite_array, positive, shown
+from opspace.tasks.ways import Pace, VectorWay, Way
 
 if TYPE_CHECKING:
     from opspace.robots.protocol import Robot
@@ -39,12 +42,45 @@ class Target:
     acceleration: Array
 
 
+@dataclass(frozen=True)
+class Followed:
+    """A reference on its way.
+
+    Attributes:
+        target: The target that it belongs to; another one ends it.
+        reference: The reference, begun.
+        pauses: How long it has stood still so far, s.
+    """
+
+    target: Target
+    reference: Reference
+    pauses: float = 0.0
+
+
+@dataclass(frozen=True)
+class Led:
+    """A value that is approached on a way.
+
+    Attributes:
+        target: The target that it belongs to; another one ends it.
+        way: The way to its value.
+    """
+
+    target: Target
+    way: Way
+
+
+Progress: TypeAlias = tuple[
+    "tuple[Hold, Array] | None", "Followed | None", "Led | None", "Target | None"
+]
+
+
 class TrackingTask(Task):
     """Base class of tasks with a target.
 
-    Subclasses say what a target value looks like (``_check_value``), look up names (``_resolve``)
-    and compute their terms (``evaluate``). ``motion_size`` is k, the length of desired velocities,
-    None while it is not known.
+    Subclasses say what a target value looks like (``_check_value``), look up names (``_resolve``),
+    compute their terms (``evaluate``) and, where a value is no vector, how one is approached
+    (``_way``). ``motion_size`` is k, the length of desired velocities, None while it is not known.
     """
 
     def __init__(
@@ -57,11 +93,21 @@ class TrackingTask(Task):
         kp: ArrayLike,
         kv: ArrayLike | None,
         max_speed: float | Sequence[float] | None,
+        max_acceleration: float | Sequence[float] | None = None,
+        ki: float | None = None,
+        max_integral: float = 0.05,
     ) -> None:
         super().__init__(name, rows=rows, units=units, kp=kp, kv=kv, max_speed=max_speed)
+        self.max_acceleration = max_acceleration
+        self._ki = None if ki is None else positive(ki, f"task {name!r}: ki")
+        self._max_integral = positive(max_integral, f"task {name!r}: max_integral")
+        self._integral: Array | None = None
         self._robot: Robot | None = None
         self._motion_size = motion_size
         self._held: tuple[Hold, Array] | None = None
+        self._followed: Followed | None = None
+        self._led: Led | None = None
+        self._before: Target | None = None
         self._target = Target(Hold(), self._vector(None, ""), self._vector(None, ""))
 
     def bind(self, robot: Robot) -> None:
@@ -72,19 +118,100 @@ class TrackingTask(Task):
             self._resolve(robot)
         except UnknownNameError as error:
             raise error.reworded(f"task {self.name!r}: {error}") from None
+        if self._ki is not None and np.any(self._ki >= self._gains.kp * self._gains.kv):
+            raise InputError(
+                f"task {self.name!r}: ki = {self._ki:g} 1/s³ diverges; it must be below kp kv = "
+                f"{float(np.min(self._gains.kp * self._gains.kv)):g} 1/s³"
+            )
         self._robot = robot
+        self._followed = None
         self.reset()
 
+    def resume(self, pause: float) -> None:
+        """See `Task.resume`; a reference and the integral go on where they were."""
+        integral = self._integral
+        super().resume(pause)
+        self._integral = integral
+        followed = self._followed
+        if followed is not None:
+            self._followed = replace(followed, pauses=followed.pauses + pause)
+
     def reset(self) -> None:
-        """Forget the held start value; the next tick finds a new one."""
-        self._held = None
+        """Forget the held start value, the integral, and where a way has come to."""
+        self._held = self._led = self._before = self._integral = None
+
+    @property
+    def ki(self) -> float | None:
+        """Integral gain, 1/s³; None is no integral action. See `opspace.controller.integral`."""
+        return self._ki
+
+    @property
+    def integral(self) -> Array:
+        """(k,) acceleration that the integral adds to f*, m/s² or rad/s², before rows are selected."""
+        return self._vector(None, "") if self._integral is None else self._integral
+
+    def integrate(self, robot: Robot, error: Array, dt: float) -> None:
+        """Add to the integral, within its bound.
+
+        Args:
+            robot: The robot given to ``bind``, at the state of the error.
+            error: (m,) error to integrate, m or rad.
+            dt: For how long, s.
+        """
+        assert self._ki is not None
+        basis = self._basis(robot)
+        most = np.abs(basis).T @ np.broadcast_to(self._max_integral * self._gains.kp, len(basis))
+        moved = self.integral + self._ki * dt * (basis.T @ error)
+        self._integral = np.clip(moved, -most, most)
+
+    def asks_too_much(self, error: Array) -> bool:
+        """Tell whether an error (m,) asks for more than ``max_speed``."""
+        return self._gains.saturates(error)
+
+    def pushed(self, desired: Sample) -> Sample:
+        """Add the integral to the desired acceleration."""
+        return desired if self._integral is None else desired._replace(a=desired.a + self._integral)
+
+    def _basis(self, robot: Robot) -> Array:
+        """Return the task's rows, (m, k), in the coordinates of its motion."""
+        del robot
+        return np.eye(self.rows)
+
+    @property
+    def progress(self) -> Progress:
+        """What it has found, begun and come to so far; ``recall`` goes back to it."""
+        return self._held, self._followed, self._led, self._before
+
+    def recall(self, progress: Progress) -> None:
+        """Go back to where it was, after somebody has only asked what it would do."""
+        if any(a is not b for a, b in zip(progress, self.progress, strict=True)):
+            self._held, self._followed, self._led, self._before = progress
+
+    @property
+    def max_acceleration(self) -> float | tuple[float, ...] | None:
+        """Acceleration of the way to a new target value, m/s² or rad/s²; None follows it at once.
+
+        With it, a value that is assigned is not followed at once: what the task follows goes there from
+        where it is, within ``max_speed``, this acceleration, and the jerk that reaches it in 0.1 s. So
+        the torque does not step. A task that comes in begins where it finds the robot. References, and
+        values with a ``target_velocity``, are followed as they are.
+        """
+        return one_or_all(self._gains.max_acceleration)
+
+    @max_acceleration.setter
+    def max_acceleration(self, value: float | Sequence[float] | None) -> None:
+        gains = self._gains
+        found = paced(value, gains.max_speed, len(self._speed_groups), self.name)
+        if found != gains.max_acceleration:
+            self._gains = replace(gains, max_acceleration=found)
 
     @property
     def target(self) -> Array | Reference | None:
         """Target value, reference in time (t ↦ Sample), or None to hold the value found next.
 
         May be assigned at any time, also from another thread; it is checked at once and followed
-        from the next tick on. A reference brings its own velocity and acceleration and clears
+        from the next tick on. A reference without a start time begins at the first tick that follows
+        it; assigned again, it begins again. It brings its own velocity and acceleration and clears
         ``target_velocity`` and ``target_acceleration``; a value leaves them as they are.
         """
         goal = self._target.goal
@@ -93,6 +220,8 @@ class TrackingTask(Task):
     @target.setter
     def target(self, value: ArrayLike | Reference | None) -> None:
         if callable(value):
+            if isinstance(value, Constant):
+                self._goal(value.value)
             rest = self._vector(None, "")
             self._target = Target(value, rest, rest)
         else:
@@ -177,6 +306,17 @@ class TrackingTask(Task):
             current: Gives the present value, kept when the target is to hold.
         """
         target = self._target  # read once: another thread may replace it during this tick
+        if self._gains.max_acceleration is None:
+            return self._followed_at(target, t, current)
+        before = self._before
+        if target is not before:
+            if isinstance(target.goal, np.ndarray) and not target.velocity.any():
+                self._lead(before, target, target.goal, t, current)
+            self._before = target
+        return self._followed_at(target, t, current)
+
+    def _followed_at(self, target: Target, t: float, current: Callable[[], Array]) -> Sample:
+        """Return what a target means at time t: what is held, referred to, approached or given."""
         goal = target.goal
         if isinstance(goal, Hold):
             held = self._held
@@ -184,18 +324,63 @@ class TrackingTask(Task):
                 held = self._held = (goal, current().copy())
             goal = held[1]
         elif callable(goal):
-            return self._sampled(goal, t)
+            return self._sampled(target, goal, t)
+        elif self._led is not None and self._led.target is target:
+            return self._led.way(t)
         return Sample(goal, target.velocity, target.acceleration)
 
-    def _sampled(self, reference: Reference, t: float) -> Sample:
+    def _lead(
+        self,
+        before: Target | None,
+        target: Target,
+        goal: Array,
+        t: float,
+        current: Callable[[], Array],
+    ) -> None:
+        """Begin the way to a value, from what is followed until now or else from what is found."""
+        led, known = self._led, None if before is None else before.goal
+        repeated = isinstance(known, np.ndarray) and np.array_equal(known, goal)
+        if repeated and led is not None and led.target is before:
+            self._led = Led(target, led.way)  # the same again, as of a value that is streamed
+            return
+        rest = self._vector(None, "")
+        now = (
+            Sample(current().copy(), rest, rest)
+            if before is None
+            else self._followed_at(before, t, current)
+        )
+        self._led = Led(target, self._way(now, goal, t))
+
+    def moves(self, t: float) -> bool:
+        """Tell whether what is desired changes after time ``t`` [s] without anything being assigned."""
+        target, led = self._target, self._led
+        if callable(target.goal) or self._ki is not None:
+            return True
+        return led is not None and led.target is target and t < led.way.end
+
+    def _pace(self, group: int = 0) -> Pace:
+        """Return the limits of the way of a group of rows."""
+        speed, acceleration = self._gains.max_speed, self._gains.max_acceleration
+        assert speed is not None
+        assert acceleration is not None
+        return Pace(speed[group], acceleration[group])
+
+    def _way(self, now: Sample, goal: Array, t: float) -> Way:
+        """Make the way from what is followed at time t to a value, which is in the task's own form."""
+        return VectorWay(now, goal, t, self._pace())
+
+    def _sampled(self, target: Target, reference: Reference, t: float) -> Sample:
         what = f"task {self.name!r}: reference at t = {t:.6g} s:"
-        sample = reference(t)
+        followed = self._followed
+        if followed is None or followed.target is not target:
+            followed = self._followed = Followed(target, begun(reference, t))
+        sample = followed.reference(t - followed.pauses)
         if not isinstance(sample, tuple) or len(sample) != 3:
             raise InputError(f"{what} must give a Sample(x, v, a), not {shown(sample)}")
         return Sample(
             self._check_value(sample[0], f"{what} x"),
-            self._vector(sample[1], f"{what} v"),
-            self._vector(sample[2], f"{what} a"),
+            self._vector(sample[1] if np.size(sample[1]) else None, f"{what} v"),
+            self._vector(sample[2] if np.size(sample[2]) else None, f"{what} a"),
         )
 
     def _terms(

@@ -10,15 +10,16 @@ from numpy.typing import ArrayLike
 from opspace.errors import InputError
 from opspace.tasks.references.phase import minimum_jerk_phase
 from opspace.tasks.references.sample import Sample
+from opspace.tasks.references.start import Started, optional_time
 from opspace.tasks.rotation import cross
-from opspace.tasks.validation import finite, finite_array, positive
+from opspace.tasks.validation import finite_array, positive
 
 
-class Circle:
+class Circle(Started):
     """Moves on a circle, x = c + r (cos θ e₁ + sin θ e₂), from rest up to one turn per period.
 
     The rate θ̇ rises from 0 to 2π/period along the minimum-jerk phase, so that the acceleration
-    is continuous from the start on; then it stays. Before the start it holds ``start``.
+    is continuous from the start on; then it stays. Before it begins it holds ``start``.
 
     Args:
         center: (3,) c, m.
@@ -26,7 +27,7 @@ class Circle:
         period: Time of one turn at full speed, s.
         normal: (3,) axis of the circle; the motion is counter-clockwise about it. e₁ is the world
             axis that is most nearly perpendicular to it, made perpendicular; e₂ = normal × e₁.
-        start_time: Time at which it begins, s.
+        start_time: Time at which it begins, s; None is the first tick that asks.
         ramp: Time to reach full speed, s; None is one period.
 
     Attributes:
@@ -43,13 +44,13 @@ class Circle:
         period: float,
         *,
         normal: ArrayLike = (0.0, 0.0, 1.0),
-        start_time: float = 0.0,
+        start_time: float | None = None,
         ramp: float | None = None,
     ) -> None:
         self.center = finite_array(center, (3,), "Circle: center")
         self.radius = positive(radius, "Circle: radius")
         self.period = positive(period, "Circle: period")
-        self.start_time = finite(start_time, "Circle: start_time")
+        self.start_time = optional_time(start_time, "Circle: start_time")
         self.ramp = self.period if ramp is None else positive(ramp, "Circle: ramp")
         axis = finite_array(normal, (3,), "Circle: normal")
         length = math.hypot(*axis)
@@ -64,16 +65,16 @@ class Circle:
 
     def __call__(self, t: float, /) -> Sample:
         """Return the desired motion at time t, s."""
-        theta, rate, acceleration = self._angle(t)
+        theta, rate, acceleration = self._angle(self.elapsed(t))
         outward = math.cos(theta) * self._e1 + math.sin(theta) * self._e2
         along = math.cos(theta) * self._e2 - math.sin(theta) * self._e1
         return Sample(self.center + outward, rate * along, acceleration * along - rate**2 * outward)
 
-    def _angle(self, t: float) -> tuple[float, float, float]:
+    def _angle(self, elapsed: float) -> tuple[float, float, float]:
         full = 2.0 * math.pi / self.period
-        s, slope, _ = minimum_jerk_phase(t, self.start_time, self.ramp)
-        u = min(max((t - self.start_time) / self.ramp, 0.0), 1.0)
+        s, slope, _ = minimum_jerk_phase(elapsed, 0.0, self.ramp)
+        u = min(max(elapsed / self.ramp, 0.0), 1.0)
         # The integral of the phase over the ramp, 5/2 u⁴ − 3 u⁵ + u⁶, then full speed.
         ramped = self.ramp * u**4 * (2.5 - 3.0 * u + u * u)
-        after = max(t - self.start_time - self.ramp, 0.0)
+        after = max(elapsed - self.ramp, 0.0)
         return full * (ramped + after), full * s, full * slope

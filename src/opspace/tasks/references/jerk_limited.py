@@ -9,15 +9,16 @@ from numpy.typing import ArrayLike
 
 from opspace.errors import InputError
 from opspace.tasks.references.sample import Sample
-from opspace.tasks.validation import Array, finite, finite_array
+from opspace.tasks.references.start import Started, optional_time
+from opspace.tasks.validation import Array, finite_array
 
 
-class JerkLimited:
+class JerkLimited(Started):
     """Moves to rest at the goal as fast as velocity, acceleration and jerk limits allow.
 
     All coordinates arrive at the same time where that can be planned, and the path is not straight
     in general (Ruckig, Berscheid and Kröger 2021). The motion is computed once, when the reference
-    is built. Holds the start before ``start_time`` and the goal after the motion. A motion on its way
+    is built. Holds the start before it begins and the goal after the motion. A motion on its way
     gets another goal without a step by a new reference that begins with its value, velocity and
     acceleration.
 
@@ -27,7 +28,7 @@ class JerkLimited:
         max_velocity: Limit of each coordinate, a number or (k,), unit/s.
         max_acceleration: Limit, a number or (k,), unit/s².
         max_jerk: Limit, a number or (k,), unit/s³.
-        start_time: Time at which it begins, s.
+        start_time: Time at which it begins, s; None is the first tick that asks.
         start_velocity: (k,) velocity at that time, unit/s; None is rest. It may be above the limit.
         start_acceleration: (k,) acceleration at that time, unit/s²; None is none.
 
@@ -46,7 +47,7 @@ class JerkLimited:
         max_velocity: ArrayLike,
         max_acceleration: ArrayLike,
         max_jerk: ArrayLike,
-        start_time: float = 0.0,
+        start_time: float | None = None,
         start_velocity: ArrayLike | None = None,
         start_acceleration: ArrayLike | None = None,
     ) -> None:
@@ -54,7 +55,7 @@ class JerkLimited:
 
         self.start = finite_array(start, (None,), "JerkLimited: start")
         self.goal = finite_array(goal, self.start.shape, "JerkLimited: goal")
-        self.start_time = finite(start_time, "JerkLimited: start_time")
+        self.start_time = optional_time(start_time, "JerkLimited: start_time")
         size = len(self.start)
         self._rest = np.zeros(size)
         velocity = _rate(start_velocity, size, "start_velocity")
@@ -74,7 +75,7 @@ class JerkLimited:
 
     def __call__(self, t: float, /) -> Sample:
         """Return the desired motion at time t, s."""
-        elapsed = t - self.start_time
+        elapsed = self.elapsed(t)
         if elapsed < 0.0:
             return Sample(self.start, self._rest, self._rest)
         if elapsed == 0.0:

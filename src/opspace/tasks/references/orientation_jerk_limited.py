@@ -9,14 +9,15 @@ from numpy.typing import ArrayLike
 
 from opspace.tasks.references.jerk_limited import JerkLimited
 from opspace.tasks.references.sample import Sample
+from opspace.tasks.references.start import Started, optional_time
 from opspace.tasks.rotation import as_rotation, cross, exp_rotation, log_rotation
-from opspace.tasks.validation import Array, finite
+from opspace.tasks.validation import Array
 
 _SERIES_BELOW = 1e-2
 """Angle in rad below which series are more accurate than differences of near numbers."""
 
 
-class OrientationJerkLimited:
+class OrientationJerkLimited(Started):
     """Turns from start to rest at the goal the short way: R = exp([φ(t)]×) R_start.
 
     φ is a `JerkLimited` motion in R³ from 0 to log(R_goal R_startᵀ), in world axes. With V the left
@@ -29,7 +30,7 @@ class OrientationJerkLimited:
         max_velocity: Limit of each coordinate of φ, rad/s.
         max_acceleration: Limit, rad/s².
         max_jerk: Limit, rad/s³.
-        start_time: Time at which it begins, s.
+        start_time: Time at which it begins, s; None is the first tick that asks.
         start_velocity: (3,) angular velocity at that time in world axes, rad/s; None is rest.
         start_acceleration: (3,) angular acceleration at that time, rad/s²; None is none.
 
@@ -48,20 +49,20 @@ class OrientationJerkLimited:
         max_velocity: float,
         max_acceleration: float,
         max_jerk: float,
-        start_time: float = 0.0,
+        start_time: float | None = None,
         start_velocity: ArrayLike | None = None,
         start_acceleration: ArrayLike | None = None,
     ) -> None:
         self.start = as_rotation(start, "OrientationJerkLimited: start")
         self.goal = as_rotation(goal, "OrientationJerkLimited: goal")
-        self.start_time = finite(start_time, "OrientationJerkLimited: start_time")
+        self.start_time = optional_time(start_time, "OrientationJerkLimited: start_time")
         self._turn = JerkLimited(
             np.zeros(3),
             log_rotation(self.goal @ self.start.T),
             max_velocity=max_velocity,
             max_acceleration=max_acceleration,
             max_jerk=max_jerk,
-            start_time=start_time,
+            start_time=0.0,
             start_velocity=start_velocity,
             start_acceleration=start_acceleration,
         )
@@ -69,9 +70,10 @@ class OrientationJerkLimited:
 
     def __call__(self, t: float, /) -> Sample:
         """Return the desired rotation matrix, angular velocity and acceleration at time t, s."""
-        phi, rate, curvature = self._turn(t)
+        elapsed = self.elapsed(t)
+        phi, rate, curvature = self._turn(elapsed)
         omega, alpha = _angular(phi, rate, curvature)
-        R = self.goal if t - self.start_time >= self.duration else exp_rotation(phi) @ self.start
+        R = self.goal if elapsed >= self.duration else exp_rotation(phi) @ self.start
         return Sample(R, omega, alpha)
 
 
