@@ -157,7 +157,8 @@ class Ramp(NamedTuple):
             blend = min(blend, 0.25 / abs(rate))
         if acceleration != 0.0:
             blend = min(blend, 1.0 / math.sqrt(abs(acceleration)))
-        covered = blend * rate / 2.0 + blend**2 * acceleration / 12.0
+        # In this order nothing overflows, however long the ramp: blend · acceleration is small.
+        covered = blend * (rate / 2.0 + blend * acceleration / 12.0)
         cruise = (target - s - covered) / (duration - 0.5 * blend)
         return Ramp(self.profile, target, t, duration, s, rate, acceleration, blend, cruise)
 
