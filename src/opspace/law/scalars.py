@@ -250,11 +250,18 @@ def rises(x: float, before: float) -> bool:
 
 # --- Tracking ----------------------------------------------------------------------------------------
 
-BRANCH_HOLD = 0.5 * math.pi
+BRANCH_HOLD = 0.25 * math.pi
 """How far past half a turn the direction chosen before is kept, rad. Noise and overshoot near half a
 turn are far smaller; at a full turn the direction would be lost, so it cannot be kept for ever."""
 
-LONGEST_WAY = math.cos(0.5 * (math.pi + BRANCH_HOLD))
+BRANCH_END = 0.75 * math.pi
+"""How far past half a turn the error has become that of the short way, rad."""
+
+LONGEST_WAY = math.cos(0.5 * (math.pi + BRANCH_END))
+
+FOLLOWED = math.cos(0.5 * 1.0)
+"""A rotation that differs by more than 1 rad from the one before is no motion but a new target or a
+new state, and takes the short way."""
 
 
 def goes_on(agreement: float, w: float) -> bool:
@@ -264,7 +271,24 @@ def goes_on(agreement: float, w: float) -> bool:
         agreement: Product of its unit quaternion, w >= 0, with the one before.
         w: Its real part; that of the long way round, cos(angle / 2), is −w.
     """
-    return agreement < 0.0 and -w >= LONGEST_WAY
+    return agreement < -FOLLOWED and -w >= LONGEST_WAY
+
+
+def error_length(angle: float) -> float:
+    """Length of the error of a rotation that has gone this far about its axis, rad.
+
+    It is the angle up to ``BRANCH_HOLD`` past half a turn. Then it falls through zero, smoothly, and
+    from ``BRANCH_END`` on it is angle − 2π: the same vector as that of the short way, to which one
+    can therefore change without a step. Where it is zero the task asks for nothing: it has to be so
+    somewhere on the way from one direction to the other.
+
+    Args:
+        angle: Angle, 0 to 2π, rad.
+    """
+    past = angle - math.pi - BRANCH_HOLD
+    if past <= 0.0:
+        return angle
+    return angle - 2.0 * math.pi * profile(QUINTIC, past / (BRANCH_END - BRANCH_HOLD))
 
 
 def speed_scale(speed: float, limit: float) -> float:
