@@ -133,6 +133,40 @@ def ramp(
     return profile(code, s)
 
 
+# --- Blends, see `opspace.stack.Blending` and `opspace.law.blending` ----------------------------------
+
+NO_GROUP, EXACT, CHAINED = range(3)
+"""How an activation is blended: not at all, exactly, by the chain. Members of the chain have numbers
+of their own: ``CHAINED`` plus a rank that nobody else in it has while they move."""
+
+REACH = 0.1
+"""How far the members of a smooth chain lean, as activations. Two lean apart by at most twice this:
+nearer to each other than that, they are blended as if either might come first."""
+
+
+def lean(rank: int) -> float:
+    """Direction −1 to 1 that the member with this rank leans in: first the ends, then between them."""
+    if rank < 2:
+        return 2.0 * rank - 1.0
+    x, part, k = 0.0, 0.5, rank - 1
+    while k > 0:  # van der Corput: the digits of a number, mirrored
+        x += part * (k % 2)
+        part *= 0.5
+        k //= 2
+    return 2.0 * x - 1.0
+
+
+def leaning(h: float, rank: int, reach: float) -> float:
+    """How far an activation leans; never out of [0, 1], and the order of equal leans stays."""
+    return 4.0 * reach * lean(rank) * h * (1.0 - h)
+
+
+def spread(y: float) -> tuple[float, float]:
+    """∫ ρ and ∫ y ρ from 0 to y of the density ρ(y) = 6 y (1 − y)."""
+    square = y * y
+    return square * (3.0 - 2.0 * y), square * y * (2.0 - 1.5 * y)
+
+
 # --- Joint limits, see `opspace.JointLimits`; everything is counted towards the limit -----------------
 
 RETURN_SPEED = 0.5
