@@ -161,7 +161,8 @@ def test_no_duration_is_too_long_or_too_short(changes, name):
         if new.duration > 0.0 and name != "step":
             assert new(t).value == pytest.approx(ramp(t).value, abs=1e-9)
         assert 0.0 <= new(t + 0.5 * duration).value <= 1.0
-        assert np.all(np.isfinite(new.numbers)) and np.all(np.isfinite(new(t)))
+        assert np.all(np.isfinite(new.numbers))
+        assert np.all(np.isfinite(new(t)))
         ramp = new
 
 

@@ -42,9 +42,10 @@ class ReferenceController:
         stack: The tasks; they may come, go and change rank while the controller runs.
         blending: How tasks that move at once are blended. ``"auto"`` (default): intermediate
             desired values while at most 3 move, the chain for those that begin to move beyond;
-            ``"idv"``: up to 16 exactly, 2^k hard torques; ``"chain"``: k + 1; or a
-            `opspace.stack.Blending` of one's own. Joint limits, of which many may act at
-            once, are always blended by the chain.
+            ``"idv"``: up to 16 exactly, 2^k hard torques; ``"chain"``: k + 1;
+            ``"smooth-chain"``: one more for each pair that is about to cross, and no kink where it
+            does; or a `opspace.stack.Blending` of one's own. Joint limits, of which many may act
+            at once, are always blended by the chain.
         bias: ``"joint"`` (default) or ``"task"``, see `BIASES`.
         singularity: Buffer for singular directions; None switches their handling off.
         damping: Joint damping in the motions that no task uses, 1/s; also what a joint is braked

@@ -31,7 +31,8 @@ _INSTANT = 1e-9
 class Profile:
     r"""A smooth step from 0 at s = 0 to 1 at s = 1, constant outside.
 
-    The torque is as smooth in time as its activations, so quintic is the default everywhere.
+    While the activations on their way are blended exactly the torque is as smooth in time as they
+    are, so quintic is the default everywhere.
 
     Args:
         name: One of `opspace.law.scalars.PROFILES`, which has formulas and smoothness.
