@@ -6,6 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import opspace as osc
+from opspace.command import Status
 from opspace.controller import Controller, ReferenceController
 from opspace.kernels.tick import tick
 from opspace.loop import simulate
@@ -213,7 +214,7 @@ def test_many_joints_at_their_limits():
 @given(
     steps=programs(0.002, 0.06),
     seed=st.integers(0, 2**32 - 1),
-    blending=st.sampled_from(["auto", "idv", "chain"]),
+    blending=st.sampled_from(["auto", "idv", "chain", "smooth-chain"]),
 )
 def test_random_programs_of_requests(steps, seed, blending):
     robot = ROBOTS[-1]
@@ -370,6 +371,22 @@ def test_a_rotation_past_half_a_turn_keeps_its_way():
     assert largest > np.pi + 0.2
 
 
+@pytest.mark.parametrize("robot", ROBOTS[:2], ids="-".join)
+@pytest.mark.parametrize("max_speed", [None, 1.0])
+def test_no_angle_makes_a_step(robot, max_speed):
+    """Two turns of the first joint away from the target: ten times finer, steps of a tenth."""
+    largest = []
+    for ticks in (400, 4000):
+        twins = Twins(robot, lambda: [OrientationTask(kp=50.0, max_speed=max_speed)])
+        q, v = twins.robot.q_reference.copy(), np.zeros(6)
+        path = []
+        for k in range(ticks):
+            path.append(twins.step(k * DT, q, v).tau)
+            q[0] += 4.0 * np.pi / ticks
+        largest.append(np.abs(np.diff(path, axis=0)).max())
+    assert largest[1] < 0.15 * largest[0]
+
+
 def test_nothing_is_compiled_once_it_is_warm():
     robot = load_robot("puma560")
     controller = Controller(robot, Stack([PositionTask()]))
@@ -424,3 +441,60 @@ def test_more_tasks_than_there_are_bits_take_the_readable_form():
 
     twins = Twins(ROBOTS[0], make)
     twins.step(0.0, robot.q_reference, np.full(6, 0.1))
+
+
+def crowded(kind, blending, ticks):
+    """31 tasks, five of them leaving, and two more places in the middle: one bit more than there are."""
+    robot = load_robot("puma560")
+    names = robot.joint_names
+    leaving = [JointTask(names[i], name=f"leaving {i}", target=[1.0]) for i in range(3)]
+    leaving += [
+        PositionTask(target=[0.5, 0.2, 0.4]),
+        OrientationTask(target=np.diag([1.0, -1, -1])),
+    ]
+    rest = [JointTask(names[i % 6], name=f"rest {i}", target=[0.3]) for i in range(25)]
+    levels = {0.1 * i: task for i, task in enumerate(leaving)}
+    stack = Stack({**levels, 1.0: PostureTask(), 2.0: rest})
+    controller = kind(robot, stack, blending=blending)
+    dt = 0.4 / ticks
+    for i, k in enumerate((4, 3, 2, 1, 0)):
+        stack.remove(leaving[k], duration=0.35, start_time=0.01 + 0.01 * i)
+    for task in rest[:3]:
+        stack.move(task, 3.0, duration=0.1, start_time=0.1)
+    return np.array(
+        [controller.step(k * dt, robot.q_reference, np.zeros(6)).tau for k in range(ticks)]
+    )
+
+
+@pytest.mark.parametrize("blending", ["auto", "chain", "smooth-chain"])
+def test_the_number_of_bits_is_crossed_without_a_step(blending):
+    """There and back again in the middle of transitions, whose groups either form goes on with."""
+    ours, readable = (crowded(kind, blending, 80) for kind in (Controller, ReferenceController))
+    np.testing.assert_allclose(ours, readable, rtol=0, atol=1e-8)
+    fine = crowded(Controller, blending, 400)
+    steps = [np.abs(np.diff(path, axis=0)).max() for path in (ours, fine)]
+    assert steps[1] < 0.3 * steps[0]
+
+
+@pytest.mark.parametrize("kind", [Controller, ReferenceController])
+@pytest.mark.parametrize("duration", [1e154, 1e300, 1.7e308])
+def test_requests_may_last_for_ever(kind, duration):
+    robot = load_robot("puma560")
+    here, there = JointTask("joint3", name="here"), JointTask("joint4", name="there")
+    stack = Stack([PositionTask(), here, PostureTask()])
+    controller = kind(robot, stack)
+    requests = [
+        lambda: stack.insert(there, 0.5, duration=duration),
+        lambda: stack.remove(there, duration=duration),
+        lambda: stack.insert(there, 0.2, duration=duration),
+        lambda: stack.swap(here, "position", duration=duration, start_time=1e300),
+        lambda: stack.move(here, 0.1, duration=duration),
+        lambda: stack.move(here, 0.3, duration=0.01),
+    ]
+    for k in range(60):
+        if k % 5 == 1 and requests:
+            requests.pop(0)()
+        command = controller.step(k * DT, robot.q_reference, np.zeros(6))
+        assert not command.status & Status.FAULT
+    controller.hand_back(np.zeros(6), duration)
+    assert not controller.step(0.06, robot.q_reference, np.zeros(6)).status & Status.FAULT

@@ -133,7 +133,7 @@ def play(robot, steps, blending, ticks, advance, observer=None):
     return controller, program, command
 
 
-@pytest.mark.parametrize("blending", ["auto", "idv", "chain"])
+@pytest.mark.parametrize("blending", ["auto", "idv", "chain", "smooth-chain"])
 @settings(max_examples=4)
 @given(steps=programs(0.02, 0.1, (4, 8)))
 def test_what_is_left_is_what_a_fresh_stack_gives(robot, blending, steps):

@@ -141,6 +141,31 @@ def test_a_reversed_ramp_is_about_as_fast_as_it_was_asked_to_be(fraction, first,
     assert -min(slopes) <= 5.0 / second + 1e-9
 
 
+ANY_LENGTH = st.one_of(
+    st.floats(0.0, allow_infinity=False, allow_nan=False),
+    st.sampled_from([5e-324, 1e-9, 1e154, 1e155, 1e300, 1.7e308]),
+)
+
+
+@MANY
+@given(
+    st.lists(st.tuples(UNIT, st.sampled_from([0.0, 1.0]), ANY_LENGTH), min_size=2, max_size=6),
+    st.sampled_from(PROFILES),
+)
+def test_no_duration_is_too_long_or_too_short(changes, name):
+    """Whatever is finite is a duration, also for a request that meets a ramp on its way."""
+    t, ramp = 0.0, Ramp.resting(0.0, name).towards(1.0, 1e300, 0.0)
+    for fraction, target, duration in changes:
+        t = min(t + fraction * min(ramp.duration, 1e300), 1e300)
+        new = ramp.towards(target, duration, t)
+        if new.duration > 0.0 and name != "step":
+            assert new(t).value == pytest.approx(ramp(t).value, abs=1e-9)
+        assert 0.0 <= new(t + 0.5 * duration).value <= 1.0
+        assert np.all(np.isfinite(new.numbers))
+        assert np.all(np.isfinite(new(t)))
+        ramp = new
+
+
 def test_zero_duration_is_a_hard_switch():
     ramp = Ramp.resting(0.0).towards(1.0, 0.0, 2.0)
     assert ramp(2.0) == (1.0, 0.0, 0.0)

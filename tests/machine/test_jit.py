@@ -40,7 +40,7 @@ def copy(tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     ("file", "old", "new"),
     [
-        ("law/scalars.py", "BRANCH_HOLD = 0.5 * math.pi", "BRANCH_HOLD = 0.9 * math.pi"),
+        ("law/scalars.py", "BRANCH_HOLD = 0.25 * math.pi", "BRANCH_HOLD = 0.3 * math.pi"),
         ("law/scalars.py", "RANK_TOLERANCE = 1e-8", "RANK_TOLERANCE = 1e-7"),
         ("command.py", "DIRECTION_OFF = 1", "DIRECTION_OFF = 2"),
         ("kernels/level.py", "NORMAL = 1e-4", "NORMAL = 1e-5"),

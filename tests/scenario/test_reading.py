@@ -21,7 +21,7 @@ from opspace.scenario import (
 )
 from opspace.scenario.document import parse
 from opspace.scenario.task_entries import ENTRIES
-from opspace.stack.groups import EXACT
+from opspace.stack.groups import RULES
 from tests.scenario.examples import EVERYTHING, scenarios
 
 TASKS = {
@@ -117,7 +117,7 @@ def choices(model, key):
 
 
 def test_choices_are_those_of_the_library():
-    assert choices(schema.Scenario, "blending") == tuple(EXACT)
+    assert choices(schema.Scenario, "blending") == tuple(RULES)
     assert choices(schema.Scenario, "backend") == BACKENDS
     assert choices(schema.SingularityEntry, "profile") == PROFILES
 

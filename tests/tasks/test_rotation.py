@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from opspace.errors import InputError
-from opspace.law.scalars import BRANCH_HOLD
+from opspace.law.scalars import BRANCH_END, BRANCH_HOLD
 from opspace.tasks.rotation import (
     as_rotation,
     cross,
@@ -127,22 +127,59 @@ def test_noise_at_half_a_turn_does_not_flip_the_error(axis, seed):
 @given(axes)
 def test_error_takes_the_short_way_once_the_long_one_is_too_long(axis):
     error = RotationError()
-    for angle in np.arange(3.0, math.pi + BRANCH_HOLD, 0.1):
+    for angle in np.arange(3.0, math.pi + BRANCH_END, 0.1):
         error(exp_rotation(angle * axis))
-    beyond = math.pi + BRANCH_HOLD + 0.01
-    np.testing.assert_allclose(
-        error(exp_rotation(beyond * axis)), (beyond - 2.0 * math.pi) * axis, rtol=0, atol=1e-9
-    )
+    for beyond in np.arange(math.pi + BRANCH_END + 0.01, 2.0 * math.pi + 1.0, 0.1):
+        np.testing.assert_allclose(
+            error(exp_rotation(beyond * axis)), (beyond - 2.0 * math.pi) * axis, rtol=0, atol=1e-9
+        )
 
 
 @given(st.lists(vectors, min_size=1, max_size=6))
 def test_error_is_always_a_logarithm_of_bounded_length(path):
+    """Except where it turns from one way to the other: there it is the axis, and shorter."""
     error = RotationError()
     for phi in path:
         R = exp_rotation(phi)
-        answer = error(R)
-        np.testing.assert_allclose(exp_rotation(answer), R, rtol=0, atol=1e-13)
-        assert np.linalg.norm(answer) <= math.pi + BRANCH_HOLD + 1e-9
+        answer, short = error(R), log_rotation(R)
+        length = np.linalg.norm(answer)
+        assert length <= math.pi + BRANCH_HOLD + 1e-9
+        if error.previous[0] >= math.cos(0.5 * (math.pi + BRANCH_HOLD)):
+            np.testing.assert_allclose(exp_rotation(answer), R, rtol=0, atol=1e-13)
+        else:
+            np.testing.assert_allclose(np.cross(answer, short), 0.0, atol=1e-9)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_error_moves_no_faster_than_a_multiple_of_the_motion(seed):
+    """Turn on and on about a wandering axis: ten times finer, the largest step is a tenth."""
+    rng = np.random.default_rng(seed)
+    axis, wander = rng.normal(size=3), 0.3 * rng.normal(size=3)
+
+    def largest(steps):
+        error, R, found, before = RotationError(), np.eye(3), 0.0, None
+        for s in np.linspace(0.0, 1.0, steps):
+            about = axis + wander * math.sin(9.0 * s + seed)
+            R = exp_rotation(about / np.linalg.norm(about) * 20.0 / steps) @ R
+            now = error(R)
+            if before is not None:
+                found = max(found, float(np.linalg.norm(now - before)))
+            before = now
+        return found
+
+    coarse, fine = largest(2000), largest(20000)
+    assert fine < 0.15 * coarse
+    assert fine < 7.0 * 20.0 / 20000
+
+
+@given(axes, st.floats(-0.9 * math.pi, 0.9 * math.pi), st.floats(-0.9 * math.pi, 0.9 * math.pi))
+def test_a_leap_takes_the_short_way(axis, first, second):
+    """A target that leaps by more than a turn of 1 rad has no way that it came."""
+    error = RotationError()
+    error(exp_rotation(first * axis))
+    answer = error(exp_rotation(second * axis))
+    if 1.01 < abs(second - first) < 2.0 * math.pi - 1.01:
+        np.testing.assert_allclose(answer, second * axis, rtol=0, atol=1e-9)
 
 
 @given(axes)

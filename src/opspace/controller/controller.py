@@ -22,6 +22,7 @@ from opspace.kernels.columns import (
     DAMPING,
     KEEP_TORQUE,
     OPTION_SIZE,
+    REACH,
     ROOM,
     SIGMA_LOWER,
     SIGMA_PROFILE,
@@ -309,7 +310,7 @@ class Controller(ReferenceController):
             self.stack.limits,
             self.robot.torque_limit,
             self._options(),
-            self._blending.room,
+            self._blending,
         )
 
     def _options(self) -> np.ndarray:
@@ -321,6 +322,6 @@ class Controller(ReferenceController):
             option[SIGMA_PROFILE] = PROFILES.index(singularity.profile)
         option[DAMPING] = self.damping
         option[TASK_BIAS] = float(self.bias == "task")
-        option[ROOM] = self._blending.room
+        option[ROOM], option[REACH] = self._blending.room, self._blending.reach
         option[KEEP_TORQUE] = float(self.torque_limits == "priority")
         return option

@@ -49,9 +49,10 @@ class ReferenceController:
         stack: The tasks; they may come, go and change rank while the controller runs.
         blending: How tasks that move at once are blended. ``"auto"`` (default): intermediate
             desired values while at most 3 move, the chain for those that begin to move beyond;
-            ``"idv"``: up to 16 exactly, 2^k hard torques; ``"chain"``: k + 1; or a
-            `opspace.stack.Blending` of one's own. Joint limits, of which many may act at
-            once, are always blended by the chain.
+            ``"idv"``: up to 16 exactly, 2^k hard torques; ``"chain"``: k + 1;
+            ``"smooth-chain"``: one more for each pair that is about to cross, and no kink where it
+            does; or a `opspace.stack.Blending` of one's own. Joint limits, of which many may act
+            at once, are always blended by the chain.
         bias: ``"joint"`` (default) or ``"task"``, see `BIASES`.
         gravity: Who adds the torque that holds the weight, ``"controller"`` (default) or ``"robot"``,
             see `GRAVITIES`.
@@ -125,7 +126,7 @@ class ReferenceController:
         if stack.limits is not None:
             stack.limits.bind(robot, self.calibration.brake)
         self._handover: Handover | None = None
-        self._plain = not self._robot_adds and self._integral is None  # what is computed is what is commanded
+        self._plain = not self._robot_adds and self._integral is None
         self._observer = _observer(stack.limits, robot.nv, torque_limits)
         self._rules = Rules(
             law,

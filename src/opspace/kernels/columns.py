@@ -57,6 +57,7 @@ VARIABLE_SIZE = 9
     DAMPING,
     TASK_BIAS,
     ROOM,
+    REACH,
     LIMIT_LAW,
     LIMIT_PROFILE,
     LIMIT_WEIGHT,
@@ -66,8 +67,8 @@ VARIABLE_SIZE = 9
     LIMIT_BOUND,
     LIMIT_BUFFER,
     KEEP_TORQUE,
-) = range(16)
-OPTION_SIZE = 16
+) = range(17)
+OPTION_SIZE = 17
 
 # What a tick answers when there is no torque.
 STATE_NOT_FINITE, NOT_FINITE, NOT_POSITIVE_DEFINITE = -1, -2, -3

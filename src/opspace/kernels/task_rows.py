@@ -24,7 +24,12 @@ from opspace.kernels.columns import (
     TOOL_AXES,
     TURN,
 )
-from opspace.kernels.compiled_scalars import goes_on, speed_scale, without_turns
+from opspace.kernels.compiled_scalars import (
+    error_length,
+    goes_on,
+    speed_scale,
+    without_turns,
+)
 from opspace.kernels.motion import A, P, R, V, measure, move_joints
 from opspace.law.scalars import SIGNS
 from opspace.machine.jit import jit
@@ -174,7 +179,7 @@ def _rotation_error(kind, number, x, e, at):
     kind[REMEMBERS] = 1
     number[TURN], number[TURN + 1], number[TURN + 2], number[TURN + 3] = w, a, b, c
     sine = math.sqrt(a * a + b * b + c * c)
-    scale = 2.0 * math.atan2(sine, w) / sine if sine > 1e-150 else 2.0 / w
+    scale = error_length(2.0 * math.atan2(sine, w)) / sine if sine > 1e-150 else 2.0 / w
     e[at], e[at + 1], e[at + 2] = scale * a, scale * b, scale * c
 
 

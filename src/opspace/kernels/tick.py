@@ -18,6 +18,7 @@ from opspace.kernels.columns import (
     NOT_FINITE,
     NOT_POSITIVE_DEFINITE,
     PROFILE,
+    REACH,
     ROOM,
     ROWS,
     SINGULAR,
@@ -27,7 +28,7 @@ from opspace.kernels.columns import (
     TASK_BIAS,
     WORLD,
 )
-from opspace.kernels.compiled_scalars import ramp
+from opspace.kernels.compiled_scalars import leaning, ramp
 from opspace.kernels.corners import corners, insert, sort_corners
 from opspace.kernels.dynamics import evaluate
 from opspace.kernels.inertia import (
@@ -43,11 +44,10 @@ from opspace.kernels.level import project, solve_level, take_alternative
 from opspace.kernels.limit_rows import SIGN, begin_limits, insert_limits, keep_bounds
 from opspace.kernels.task_rows import evaluate_tasks
 from opspace.kernels.walk import begin, keep_inside, pass_on, slot_bit, walk
-from opspace.law.scalars import LIMIT_PASSES
+from opspace.law.scalars import CHAINED, EXACT, LIMIT_PASSES, NO_GROUP
 from opspace.law.scalars import SCALED as GIVEN_WAY
 from opspace.machine.jit import jit
 
-NO_GROUP, EXACT, CHAINED = range(3)
 FADED = int(Status.DIRECTION_OFF)
 LIMITED = int(Status.JOINT_LIMIT)
 ABOVE = int(Status.ABOVE_TORQUE_LIMIT)
@@ -106,7 +106,7 @@ def _finite(x):
 def activations(t, work):
     """Activation of every task and change of place at t [s], and who belongs to which group.
 
-    Reads variable and own, writes value (variables,), h (tasks,), group and chained (variables,).
+    Reads variable and own, writes value (variables,), h (tasks,), group, low and width (variables,).
     """
     tasks = work.kind.shape[0]
     for i in range(work.variable.shape[0]):
@@ -123,33 +123,45 @@ def activations(t, work):
         elif work.group[i] == EXACT:
             exact += 1
     for i in range(work.value.shape[0]):
-        if 0.0 < work.value[i] < 1.0 and work.group[i] == NO_GROUP:
+        h = work.value[i]
+        if not 0.0 < h < 1.0:
+            continue
+        if work.group[i] == NO_GROUP:
             if exact < work.option[ROOM]:
                 work.group[i] = EXACT
                 exact += 1
             else:
-                work.group[i] = CHAINED
-        work.chained[i] = 1 if work.group[i] == CHAINED else 0
+                work.group[i] = _free_rank(work.group)
+        if work.group[i] >= CHAINED:
+            side = leaning(h, work.group[i] - CHAINED, work.option[REACH])
+            work.low[i], work.width[i] = h - side, 2.0 * side
+
+
+@jit
+def _free_rank(group):
+    """Number of the chain that no activation has."""
+    found = CHAINED
+    while True:
+        taken = False
+        for i in range(group.shape[0]):
+            if group[i] == found:
+                taken = True
+        if not taken:
+            return found
+        found += 1
 
 
 @jit
 def blend(work):
     """Hard stacks between which the tasks are on their way (`opspace.stack.mixture`).
 
-    Reads value and the slots, writes share (slots,), corner_on and corner_weight (2 corners,).
+    Reads value, group and the slots, writes share (slots,), corner_on and corner_weight (2 corners,).
 
     Returns:
         Number of different stacks.
     """
     slots = work.slots.shape[0]
-    count = corners(
-        work.value,
-        work.value.shape[0],
-        work.chained,
-        work.corner_on,
-        work.corner_weight,
-        work.order,
-    )
+    count = corners(work, work.corner_on, work.corner_weight)
     for s in range(slots):
         work.share[s] = 0.0
     for c in range(count):

@@ -1,7 +1,7 @@
 """The mathematics of continuous task transitions: arrays in, arrays out, no robot."""
 
 from opspace.law.activation import Activation, Buffer, Profile, Ramp
-from opspace.law.blending import BLENDINGS, Weighted, combined, corners
+from opspace.law.blending import BLENDINGS, Weighted, combined, corners, leaning_chain
 from opspace.law.nearest import excess, nearest_acceleration
 from opspace.law.scalars import BROKEN, LOST, PROFILES
 from opspace.law.singular_directions import SigmaBuffer
@@ -29,6 +29,7 @@ __all__ = [
     "corners",
     "excess",
     "intermediate_values",
+    "leaning_chain",
     "nearest_acceleration",
     "task_torque",
 ]

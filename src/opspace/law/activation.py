@@ -31,7 +31,8 @@ _INSTANT = 1e-9
 class Profile:
     r"""A smooth step from 0 at s = 0 to 1 at s = 1, constant outside.
 
-    The torque is as smooth in time as its activations, so quintic is the default everywhere.
+    While the activations on their way are blended exactly the torque is as smooth in time as they
+    are, so quintic is the default everywhere.
 
     Args:
         name: One of `opspace.law.scalars.PROFILES`, which has formulas and smoothness.
@@ -157,7 +158,8 @@ class Ramp(NamedTuple):
             blend = min(blend, 0.25 / abs(rate))
         if acceleration != 0.0:
             blend = min(blend, 1.0 / math.sqrt(abs(acceleration)))
-        covered = blend * rate / 2.0 + blend**2 * acceleration / 12.0
+        # In this order nothing overflows, however long the ramp: blend · acceleration is small.
+        covered = blend * (rate / 2.0 + blend * acceleration / 12.0)
         cruise = (target - s - covered) / (duration - 0.5 * blend)
         return Ramp(self.profile, target, t, duration, s, rate, acceleration, blend, cruise)
 

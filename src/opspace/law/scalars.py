@@ -133,6 +133,40 @@ def ramp(
     return profile(code, s)
 
 
+# --- Blends, see `opspace.stack.Blending` and `opspace.law.blending` ----------------------------------
+
+NO_GROUP, EXACT, CHAINED = range(3)
+"""How an activation is blended: not at all, exactly, by the chain. Members of the chain have numbers
+of their own: ``CHAINED`` plus a rank that nobody else in it has while they move."""
+
+REACH = 0.1
+"""How far the members of a smooth chain lean, as activations. Two lean apart by at most twice this:
+nearer to each other than that, they are blended as if either might come first."""
+
+
+def lean(rank: int) -> float:
+    """Direction −1 to 1 that the member with this rank leans in: first the ends, then between them."""
+    if rank < 2:
+        return 2.0 * rank - 1.0
+    x, part, k = 0.0, 0.5, rank - 1
+    while k > 0:  # van der Corput: the digits of a number, mirrored
+        x += part * (k % 2)
+        part *= 0.5
+        k //= 2
+    return 2.0 * x - 1.0
+
+
+def leaning(h: float, rank: int, reach: float) -> float:
+    """How far an activation leans; never out of [0, 1], and the order of equal leans stays."""
+    return 4.0 * reach * lean(rank) * h * (1.0 - h)
+
+
+def spread(y: float) -> tuple[float, float]:
+    """∫ ρ and ∫ y ρ from 0 to y of the density ρ(y) = 6 y (1 − y)."""
+    square = y * y
+    return square * (3.0 - 2.0 * y), square * y * (2.0 - 1.5 * y)
+
+
 # --- Joint limits, see `opspace.JointLimits`; everything is counted towards the limit -----------------
 
 RETURN_SPEED = 0.5
@@ -250,11 +284,18 @@ def rises(x: float, before: float) -> bool:
 
 # --- Tracking ----------------------------------------------------------------------------------------
 
-BRANCH_HOLD = 0.5 * math.pi
+BRANCH_HOLD = 0.25 * math.pi
 """How far past half a turn the direction chosen before is kept, rad. Noise and overshoot near half a
 turn are far smaller; at a full turn the direction would be lost, so it cannot be kept for ever."""
 
-LONGEST_WAY = math.cos(0.5 * (math.pi + BRANCH_HOLD))
+BRANCH_END = 0.75 * math.pi
+"""How far past half a turn the error has become that of the short way, rad."""
+
+LONGEST_WAY = math.cos(0.5 * (math.pi + BRANCH_END))
+
+FOLLOWED = math.cos(0.5 * 1.0)
+"""A rotation that differs by more than 1 rad from the one before is no motion but a new target or a
+new state, and takes the short way."""
 
 
 SIGNS = 48
@@ -268,7 +309,24 @@ def goes_on(agreement: float, w: float) -> bool:
         agreement: Product of its unit quaternion, w >= 0, with the one before.
         w: Its real part; that of the long way round, cos(angle / 2), is −w.
     """
-    return agreement < 0.0 and -w >= LONGEST_WAY
+    return agreement < -FOLLOWED and -w >= LONGEST_WAY
+
+
+def error_length(angle: float) -> float:
+    """Length of the error of a rotation that has gone this far about its axis, rad.
+
+    It is the angle up to ``BRANCH_HOLD`` past half a turn. Then it falls through zero, smoothly, and
+    from ``BRANCH_END`` on it is angle − 2π: the same vector as that of the short way, to which one
+    can therefore change without a step. Where it is zero the task asks for nothing: it has to be so
+    somewhere on the way from one direction to the other.
+
+    Args:
+        angle: Angle, 0 to 2π, rad.
+    """
+    past = angle - math.pi - BRANCH_HOLD
+    if past <= 0.0:
+        return angle
+    return angle - 2.0 * math.pi * profile(QUINTIC, past / (BRANCH_END - BRANCH_HOLD))
 
 
 def without_turns(error: float, known: bool, negative: bool) -> float:

@@ -125,7 +125,10 @@ def _checked_inertia(robot: Robot) -> np.ndarray:
 
 
 def sample_postures(robot: Robot) -> Iterator[np.ndarray]:
-    """Visit postures uniformly distributed within the joint limits, one turn where there are none.
+    """Visit postures uniformly distributed within the joint limits.
+
+    Where there are none it is one turn of a hinge, and ±π m of a slide: how far one without an end
+    goes no model tells. What carries mass further out than that has less σ than any posture here.
 
     Args:
         robot: A robot whose joints have one coordinate each.

@@ -18,8 +18,8 @@ from opspace.kernels.columns import (
     LIMIT_WEIGHT,
 )
 from opspace.kernels.limit_rows import DISTURBANCE, SIGN, SPEED
-from opspace.kernels.tick import CHAINED, EXACT
 from opspace.law import PROFILES
+from opspace.law.scalars import NO_GROUP
 from opspace.machine.field_table import Record
 from opspace.plan.memory import Sizes, make_tick
 from opspace.plan.pack_task import Packed
@@ -44,7 +44,7 @@ class Plan:
         limits: Joint limits, or None.
         torque_limit: (n,) what the motors give, N·m.
         options: Numbers of the controller's options, (OPTION_SIZE,).
-        room: How many activations are blended exactly.
+        blending: How activations are blended.
     """
 
     def __init__(
@@ -55,7 +55,7 @@ class Plan:
         limits: JointLimits | None,
         torque_limit: np.ndarray,
         options: np.ndarray,
-        room: int,
+        blending: Blending,
     ) -> None:
         self.members = members
         self.structure = structure(members)
@@ -77,7 +77,7 @@ class Plan:
             levels=len(self.levels),
             variables=len(self.variables),
             limits=0 if limits is None else len(limits.sides),
-            corners=_most_corners(len(self.variables), room),
+            corners=blending.most_corners(len(self.variables)),
         )
         self.tick, self.memory = make_tick(self.size, axes, torque_limit, options)
         self.seen: object = None
@@ -144,7 +144,7 @@ class Plan:
         groups = {} if before is None else before.groups()
         known = {} if before is None else {p.member: p for p in before.packed}
         self.members, self.variables = members, variables
-        self.tick.group[:] = [groups.get(v, 0) for v in variables]
+        self.tick.group[:] = [groups.get(v, NO_GROUP) for v in variables]
         for packed, member in zip(self.packed, members, strict=True):
             packed.member = member
             packed.remember(known.get(member))
@@ -157,21 +157,15 @@ class Plan:
 
     def leave(self, members: Sequence[Member], blending: Blending) -> None:
         """Let the readable form go on with these tasks where this plan was at the tick before."""
-        groups = self.groups()
-        exact, chained = (
-            [who for who, group in groups.items() if group == one] for one in (EXACT, CHAINED)
-        )
-        blending.remember(exact, chained)
+        blending.remember(self.groups())
         for packed in self.packed:
             if packed.member in members:
                 packed.leave()
 
     def come_back(self, blending: Blending) -> None:
         """Go on where the readable form was at the tick before."""
-        exact, chained = blending.remembered()
-        self.tick.group[:] = [
-            EXACT * (v in exact) + CHAINED * (v in chained) for v in self.variables
-        ]
+        groups = blending.remembered()
+        self.tick.group[:] = [groups.get(v, NO_GROUP) for v in self.variables]
         for packed in self.packed:
             packed.come_back()
         self.seen = None
@@ -218,12 +212,6 @@ def structure(members: Sequence[Member]) -> tuple[object, ...]:
         for place in member.places:
             found += (place.level, seen.setdefault(place.arrival, len(seen)))
     return tuple(found)
-
-
-def _most_corners(variables: int, room: int) -> int:
-    """Corners if everything moves: any task may be given an activation of its own at any time."""
-    exact = min(variables, room)
-    return 2**exact * (variables - exact + 1)
 
 
 def _arrivals(members: Sequence[Member]) -> list[Variable]:

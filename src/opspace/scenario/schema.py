@@ -188,10 +188,10 @@ class Scenario(Entry):
         description="what happens above the motors' limits: report it, or let levels give way, "
         "the lowest first",
     )
-    blending: Literal["auto", "idv", "chain"] = Field(
+    blending: Literal["auto", "idv", "chain", "smooth-chain"] = Field(
         default="auto",
         description="blend of simultaneous transitions: idv for 3 and the chain beyond, "
-        "idv with 2^k hard torques, or chain with k + 1",
+        "idv with 2^k hard torques, chain with k + 1, or smooth-chain without its kinks",
     )
     bias: Literal["joint", "task"] = Field(
         default="joint",

@@ -14,7 +14,8 @@ class OrientationTask(MotionTask):
     """Turns a frame to an orientation: f* = a_d + kv (ω_d − ω) + kp R log(Rᵀ R_d).
 
     The error is the rotation vector from R to R_d in world axes. It stays continuous when it
-    grows past half a turn (see ``RotationError``); ``reset`` makes it take the short way again.
+    grows past half a turn, and where it then goes over to the short way (see ``RotationError``);
+    ``reset`` and a target that leaps make it take the short way at once.
 
     Args:
         frame: Name of the frame; None is the robot's tool.

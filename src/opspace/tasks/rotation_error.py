@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from opspace.law.scalars import goes_on
+import math
+
+from opspace.law.scalars import error_length, goes_on
 from opspace.tasks.rotation import quaternion_from_matrix, rotation_vector
 from opspace.tasks.validation import Array
 from opspace.tasks.way_round import WayRound, rotation_jumps
@@ -14,8 +16,11 @@ class RotationError(WayRound):
     The logarithm of SO(3) jumps from π to −π about its axis at half a turn. A controller that
     follows it would reverse its command there, and again with every bit of noise. This one
     follows the unit quaternion of the error continuously instead: an error that grows past π goes
-    on growing about the same axis up to π + ``BRANCH_HOLD`` and takes the short way only then.
-    Below π and without a past it is the plain logarithm.
+    on growing about the same axis up to π + ``BRANCH_HOLD``. From there to π + ``BRANCH_END`` it
+    turns into the error of the short way (`opspace.law.scalars.error_length`), again continuously:
+    between two calls it changes by no more than a fixed multiple of the motion in between. Up to
+    π + ``BRANCH_HOLD`` it is a logarithm; below π, without a past and after a leap (``FOLLOWED``)
+    it is the plain one.
 
     Attributes:
         previous: Quaternion wxyz of the last error, None without a past.
@@ -39,4 +44,7 @@ class RotationError(WayRound):
             if goes_on(agreement, q[0]):
                 q = (-q[0], -q[1], -q[2], -q[3])
         self.previous = q
-        return rotation_vector(q)
+        phi = rotation_vector(q)
+        angle = math.hypot(*phi.tolist())
+        length = error_length(angle)
+        return phi if length == angle else phi * (length / angle)
