@@ -129,7 +129,7 @@ def check_command(line):
     elif words[0] == "make":
         assert re.search(rf"^{words[1]}:", (ROOT / "Makefile").read_text("utf-8"), re.MULTILINE)
     elif words[:2] == ["pip", "install"]:
-        asked = re.fullmatch(r"opspace(?:\[([\w,]+)\])?", words[2])
+        asked = re.fullmatch(r"(?:opspace|\.)(?:\[([\w,]+)\])?", words[2])
         assert asked, line
         extras = metadata.metadata("opspace").get_all("Provides-Extra", [])
         assert set((asked[1] or "all").split(",")) <= set(extras), line

@@ -16,7 +16,7 @@ from opspace.scenario.document import key_text, parse, to_yaml
 from tests.scenario.examples import EVERYTHING
 
 DATA = parse(EVERYTHING).data
-NAMED = {("tasks",), ("joint_limits", "joints")}
+NAMED = {("tasks",), ("locked",), ("joint_limits", "joints")}
 """Mappings whose keys are names of the user's."""
 
 
@@ -203,11 +203,11 @@ MISTAKES = [
         "blending: chain",
         "blending: chian",
         "blending",
-        "did you mean 'chain'? (valid: auto, idv, chain)",
+        "did you mean 'chain'? (valid: auto, idv, chain, smooth-chain)",
     ),
     ("duration: 1e1", "duration: 3601", "duration", "above 0 and at most 3600 [s], not 3601"),
     ("duration: 1e1", "duration: 1e-3", "dt", "not be longer than the duration, 0.001 s"),
-    ("seed: 5", "seed: 5\nseed: 6", "seed", "given twice, first on line 7"),
+    ("seed: 5", "seed: 5\nseed: 6", "seed", "given twice, first on line 10"),
     ("  wrist:", "  rest:", "tasks.rest", "given twice"),
     ("robot: puma560", "robot: ' '", "robot", "name of a robot"),
     ("  max_torque: 500", "  max_torque: [", "", "YAML"),

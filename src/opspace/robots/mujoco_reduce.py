@@ -16,17 +16,17 @@ from opspace.robots.mujoco_joints import home_configuration
 from opspace.robots.mujoco_names import FREE, joint_names, key_names
 
 
-class Pose(NamedTuple):
+class Placement(NamedTuple):
     """A rotation (quaternion wxyz) and a translation, m."""
 
     quat: np.ndarray
     pos: np.ndarray
 
-    def then(self, other: Pose) -> Pose:
+    def then(self, other: Placement) -> Placement:
         """Return self · other."""
         quat = np.empty(4)
         mujoco.mju_mulQuat(quat, self.quat, other.quat)
-        return Pose(quat, self.pos + self.turned(other.pos))
+        return Placement(quat, self.pos + self.turned(other.pos))
 
     def turned(self, vector: np.ndarray) -> np.ndarray:
         """Return a vector turned by it."""
@@ -35,13 +35,13 @@ class Pose(NamedTuple):
         return out
 
     @property
-    def inverse(self) -> Pose:
+    def inverse(self) -> Placement:
         """Return its inverse."""
         quat = self.quat * [1.0, -1.0, -1.0, -1.0]
-        return Pose(quat, -Pose(quat, self.pos).turned(self.pos))
+        return Placement(quat, -Placement(quat, self.pos).turned(self.pos))
 
 
-NOWHERE = Pose(np.array([1.0, 0.0, 0.0, 0.0]), np.zeros(3))
+NOWHERE = Placement(np.array([1.0, 0.0, 0.0, 0.0]), np.zeros(3))
 
 
 def hold_joints(spec: mujoco.MjSpec, model: mujoco.MjModel, roles: JointRoles) -> None:
@@ -162,7 +162,7 @@ def _hold_body(
         _place(body, _pose(spec, body).then(held))
 
 
-def _pose(spec: mujoco.MjSpec, body: mujoco.MjsBody) -> Pose:
+def _pose(spec: mujoco.MjSpec, body: mujoco.MjsBody) -> Placement:
     """Return where a body stands on its parent or in its frame."""
     quat = np.array(body.quat, dtype=float)
     if body.alt.type != mujoco.mjtOrientation.mjORIENTATION_QUAT:
@@ -172,15 +172,15 @@ def _pose(spec: mujoco.MjSpec, body: mujoco.MjsBody) -> Pose:
                 degree=compiler.degree, sequence=compiler.eulerseq, orientation=body.alt
             )
         )
-    return Pose(quat / np.linalg.norm(quat), np.array(body.pos, dtype=float))
+    return Placement(quat / np.linalg.norm(quat), np.array(body.pos, dtype=float))
 
 
-def _place(body: mujoco.MjsBody, pose: Pose) -> None:
+def _place(body: mujoco.MjsBody, pose: Placement) -> None:
     body.alt.type = mujoco.mjtOrientation.mjORIENTATION_QUAT
     body.pos, body.quat = pose.pos, pose.quat
 
 
-def _motion(model: mujoco.MjModel, j: int, value: float | None) -> Pose:
+def _motion(model: mujoco.MjModel, j: int, value: float | None) -> Placement:
     """Return what a joint does to its body at a position, measured from the model's zero."""
     place, kind = int(model.jnt_qposadr[j]), int(model.jnt_type[j])
     anchor, axis = np.array(model.jnt_pos[j]), np.array(model.jnt_axis[j])
@@ -188,17 +188,17 @@ def _motion(model: mujoco.MjModel, j: int, value: float | None) -> Pose:
     if value is None:
         quat = home_configuration(model)[place : place + 4]
     elif kind == mujoco.mjtJoint.mjJNT_SLIDE:
-        return Pose(quat, axis * (value - float(model.qpos0[place])))
+        return Placement(quat, axis * (value - float(model.qpos0[place])))
     else:
         mujoco.mju_axisAngle2Quat(quat, axis, value - float(model.qpos0[place]))
-    turn = Pose(quat, np.zeros(3))
-    return Pose(quat, anchor - turn.turned(anchor))
+    turn = Placement(quat, np.zeros(3))
+    return Placement(quat, anchor - turn.turned(anchor))
 
 
-def _free_pose(model: mujoco.MjModel, j: int) -> Pose:
+def _free_pose(model: mujoco.MjModel, j: int) -> Placement:
     """Return where the file has a free body, seen from where its zero has it."""
     place, body = int(model.jnt_qposadr[j]), int(model.jnt_bodyid[j])
     q = home_configuration(model)[place : place + 7]
-    there = Pose(q[3:] / np.linalg.norm(q[3:]), q[:3].copy())
-    zero = Pose(np.array(model.body_quat[body]), np.array(model.body_pos[body]))
+    there = Placement(q[3:] / np.linalg.norm(q[3:]), q[:3].copy())
+    zero = Placement(np.array(model.body_quat[body]), np.array(model.body_pos[body]))
     return zero.inverse.then(there)

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from opspace.errors import InputError, unknown_name
-from opspace.robots.joint_units import joint_units
 from opspace.tasks.rotation import ORTHONORMAL_TOLERANCE
 from opspace.tasks.validation import Array
 
@@ -104,6 +103,8 @@ def joint_layout(robot: Robot, joints: Sequence[str] | None) -> Layout:
     J = np.eye(robot.nv)[coordinates]
     drift = np.zeros(len(coordinates))
     J.flags.writeable = drift.flags.writeable = False
+    from opspace.robots.joint_units import joint_units  # noqa: PLC0415 - a package slow to import
+
     units = joint_units(robot)
     return Layout(
         coordinates=np.array(coordinates),
