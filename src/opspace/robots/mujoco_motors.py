@@ -68,7 +68,7 @@ class Actuation(NamedTuple):
         """Return the torque that every joint has in both directions, (nv,) N·m or N."""
         return np.array([max(0.0, min(-span.least, span.most)) for span in self.spans])
 
-    def without(self, followers: Iterable[str]) -> Motors:
+    def without(self, followers: Iterable[str]) -> Actuation:
         """Leave out joints that others move: what a tendon gives them is the leader's."""
         gone = set(followers)
         left = {t: tuple(n for n in names if n not in gone) for t, names in self.shared.items()}
