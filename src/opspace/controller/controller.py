@@ -22,7 +22,9 @@ from opspace.kernels.columns import (
     DAMPING,
     KEEP_TORQUE,
     OPTION_SIZE,
+    RELEASE_UPPER,
     ROOM,
+    SIGMA_DAMPING,
     SIGMA_LOWER,
     SIGMA_PROFILE,
     SIGMA_UPPER,
@@ -305,11 +307,12 @@ class Controller(ReferenceController):
 
     def _options(self) -> np.ndarray:
         option = np.zeros(OPTION_SIZE)
-        singularity = self.singularity
-        if singularity is not None:
+        buffer = self._scales.buffer
+        if buffer is not None:
             option[SINGULAR] = 1.0
-            option[SIGMA_LOWER], option[SIGMA_UPPER] = singularity.lower, singularity.upper
-            option[SIGMA_PROFILE] = PROFILES.index(singularity.profile)
+            option[SIGMA_LOWER], option[SIGMA_UPPER] = buffer.lower, buffer.upper
+            option[SIGMA_PROFILE] = PROFILES.index(buffer.profile)
+            option[RELEASE_UPPER], option[SIGMA_DAMPING] = buffer.release_upper, buffer.damping
         option[DAMPING] = self.damping
         option[TASK_BIAS] = float(self.bias == "task")
         option[ROOM] = self._blending.room

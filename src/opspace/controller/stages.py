@@ -49,6 +49,7 @@ class Question(NamedTuple):
         levels: Numbers of the levels by their rank.
         buffer: Where singular directions fade; None for nowhere.
         motors: Torque limits to stay inside of; None where they are not asked.
+        motion: (n,) whitened velocity Lᵀ q̇, √J.
     """
 
     L: np.ndarray
@@ -57,6 +58,7 @@ class Question(NamedTuple):
     levels: Sequence[float]
     buffer: SigmaBuffer | None
     motors: Motors | None
+    motion: np.ndarray
 
 
 Law = Callable[[Question], tuple[np.ndarray, LawInfo]]
@@ -65,8 +67,10 @@ Law = Callable[[Question], tuple[np.ndarray, LawInfo]]
 
 def sum_of_hard_torques(asked: Question) -> tuple[np.ndarray, LawInfo]:
     """Γ = Σ_T w_T H(T; f̃), the library's own law (Eq. 19-23)."""
-    L, task_sets, blend, _, buffer, motors = asked
-    return blended_torque(L, task_sets, blend, buffer, want_spectra=True, motors=motors)
+    L, task_sets, blend, _, buffer, motors, motion = asked
+    return blended_torque(
+        L, task_sets, blend, buffer, want_spectra=True, motors=motors, motion=motion
+    )
 
 
 @dataclass(frozen=True)
@@ -248,7 +252,8 @@ def law(
     shifted = [Weighted(w, frozenset(first + i for i in here)) for w, here in tasks.corners]
     everything = combined(limits.corners, shifted)
     motors = Motors(L, start_inside(k), k.torque_limit) if rules.keep_torque else None
-    return rules.law(Question(L, sets, everything, mixed.levels, rules.scales.buffer, motors))
+    buffer, motion = rules.scales.buffer, L.T @ k.v
+    return rules.law(Question(L, sets, everything, mixed.levels, buffer, motors, motion))
 
 
 def start_inside(k: Given) -> np.ndarray:

@@ -52,6 +52,8 @@ VARIABLE_SIZE = 9
     SIGMA_LOWER,
     SIGMA_UPPER,
     SIGMA_PROFILE,
+    RELEASE_UPPER,
+    SIGMA_DAMPING,
     DAMPING,
     TASK_BIAS,
     ROOM,
@@ -64,8 +66,8 @@ VARIABLE_SIZE = 9
     LIMIT_BOUND,
     LIMIT_BUFFER,
     KEEP_TORQUE,
-) = range(16)
-OPTION_SIZE = 16
+) = range(18)
+OPTION_SIZE = 18
 
 # What a tick answers when there is no torque.
 STATE_NOT_FINITE, NOT_FINITE, NOT_POSITIVE_DEFINITE = -1, -2, -3

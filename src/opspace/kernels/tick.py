@@ -226,6 +226,8 @@ def law(work, stacks, limit_stacks):
     levels = space.u.shape[0] - 1
     if work.option[KEEP_TORQUE] != 0.0:
         start_inside(work, n)
+    if work.option[SINGULAR] != 0.0:
+        whitened_of(work.inertia, work.v, space.motion)
     for a in range(n):
         work.u[a] = 0.0
     begin(n, levels, space)

@@ -138,6 +138,12 @@ def ramp(
 RETURN_SPEED = 0.5
 """Speed at which a joint that is outside its limits is brought back, rad/s or m/s."""
 
+STOP_WITHIN = 5e-5
+"""How far beyond its limit a joint that came too fast may come to a stop, rad or m."""
+SHORTEST_STOP = 2e-3
+"""The shortest time in which a joint is asked to stop, s."""
+
+
 ADMISSIBLE, BUFFER = range(2)
 
 
@@ -175,7 +181,18 @@ def admissible_command(
 ) -> float:  # fmt: skip
     """Evaluate q̈_adm at distance d and speed ``towards``, for the largest speed ``most``."""
     allowed, slope = allowed_speed(d, brake, k1)
-    return min(-towards * slope + k2 * (allowed - towards), k2 * (most - towards))
+    command = min(-towards * slope + k2 * (allowed - towards), k2 * (most - towards))
+    return min(command, stopping(d, towards)) if towards > max(allowed, 0.0) else command
+
+
+def stopping(d: float, towards: float) -> float:
+    """Evaluate −v²/2d, with which a joint that is faster than allowed still stops at its limit.
+
+    Where the joint is within `STOP_WITHIN` of the limit, or would have to stop sooner than in
+    `SHORTEST_STOP`, it is less, so that it stays bounded; beyond, the way back takes over.
+    """
+    way = max(d + STOP_WITHIN, 0.5 * towards * SHORTEST_STOP)
+    return -min(max(1.0 + d / STOP_WITHIN, 0.0), 1.0) * towards * towards / (2.0 * way)
 
 
 def admissible_presence(

@@ -116,6 +116,7 @@ SPACE = RecordTable(
     _work("y", ("widest",), "any other vector"),
     _work("scale", ("widest",), "scales of reflectors"),
     _work("sigma", ("n",), "singular values"),
+    _work("motion", ("n",), "whitened velocity Uᵀ q̇", "√J"),
     _reported("kept", ("slot_rows", "n"), "B of each level when `top` was found"),
     _plan("first_kept", (_DEPTHS,), "row where that begins for each level", dtype=_INT),
     _work("motors", (1,), "whether torque limits are kept", dtype=_INT),
