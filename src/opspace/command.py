@@ -69,7 +69,10 @@ class LevelStatus:
             among the ones that have tasks here, which the directions belong to.
         sigma: (k,) eigenvalues of the projected inverse inertia of the level, Eq. 25, strongest
             first; multiples of the tasks' reference values unless the buffer is absolute.
-        activation: (k,) activation of each direction.
+        activation: (k,) activation of each direction: below 1 its motion is released to the levels
+            below.
+        response: (k,) part of what the tasks ask for that each direction answers; below 1 it follows
+            slower and is damped, but arrives.
         directions: (m, k) the directions as columns, in the stacked rows of the tasks.
         scale: Part of its torque that the level got; below 1 only with ``torque_limits="priority"``.
     """
@@ -78,6 +81,7 @@ class LevelStatus:
     tasks: tuple[str, ...]
     sigma: np.ndarray
     activation: np.ndarray
+    response: np.ndarray
     directions: np.ndarray
     scale: float = 1.0
 

@@ -1,4 +1,4 @@
-"""The last line behind joint limits: a projection that keeps what can be kept."""
+"""The projection behind the law: what can be kept is kept, and by the nearest acceleration there is."""
 
 import daqp
 import numpy as np
@@ -8,7 +8,10 @@ from hypothesis import strategies as st
 
 from opspace.kernels.inertia import factor
 from opspace.kernels.projection import nearest_acceleration as compiled
-from opspace.law import excess, nearest_acceleration
+from opspace.law import nearest_acceleration, task_metric
+from opspace.law.hierarchy import Level, WhitenedTask
+from opspace.law.nearest import nearest_point
+from opspace.law.scalars import HARD, SOFT
 from opspace.plan.memory import make_inertia
 from opspace.plan.records import BOUNDS
 
@@ -16,7 +19,7 @@ INF = np.inf
 
 
 def problem(seed, contradictory=False):
-    """Inertia, acceleration and bounds, some of them infinite; kept by some acceleration if possible."""
+    """Inertia, metric, acceleration and bounds, some infinite; kept by some acceleration if possible."""
     rng = np.random.default_rng(seed)
     n = int(rng.integers(1, 10))
     B = rng.normal(size=(n, n))
@@ -28,8 +31,10 @@ def problem(seed, contradictory=False):
         lower = lower + 30.0
     torque = A @ possible
     least, most = (torque + s * rng.exponential(20.0, n) for s in (-1.0, 1.0))
+    J = rng.normal(size=(int(rng.integers(0, 5)), n))
     return (
         np.linalg.cholesky(A),
+        np.eye(n) + 10.0 ** rng.uniform(-1.0, 2.0) * J.T @ J,
         rng.normal(0.0, 30.0, n),
         np.where(there, lower, -INF),
         np.where(rng.random(n) < 0.7, upper, INF),
@@ -38,12 +43,13 @@ def problem(seed, contradictory=False):
     )
 
 
-def by_solver(L, acceleration, lower, upper, least, most):
+def by_solver(L, W, acceleration, lower, upper, least, most):
     A = L @ L.T
     big = 1e30
+    metric = L @ W @ L.T
     x, _, flag, _ = daqp.solve(
-        A,
-        -A @ acceleration,
+        metric,
+        -metric @ acceleration,
         np.concatenate([np.eye(len(A)), A]),
         np.clip(np.concatenate([upper, most]), -big, big),
         np.clip(np.concatenate([lower, least]), -big, big),
@@ -56,73 +62,134 @@ def by_solver(L, acceleration, lower, upper, least, most):
 seeds = st.integers(0, 2**32 - 1)
 
 
-@given(seeds)
-def test_bounds_that_can_be_kept_are_kept(seed):
-    L, start, lower, upper, least, most = problem(seed)
-    x = nearest_acceleration(L, start, lower, upper, least, most)
-    assert excess(x, lower, upper) < 1e-4
-    assert excess(L @ L.T @ x, least, most) < 1e-6
+@given(seeds, st.booleans())
+def test_a_bound_is_exceeded_by_its_softness_times_what_holds_it(seed, contradictory):
+    """The conditions of Karush, Kuhn and Tucker: no other point is nearer, whatever the numbers."""
+    L, W, start, lower, upper, least, most = problem(seed, contradictory)
+    C = L @ np.linalg.cholesky(W)
+    rows = np.concatenate([np.linalg.inv(C).T, np.linalg.solve(C, L @ L.T).T])
+    rows, bounds = np.concatenate([rows, -rows]), np.concatenate([upper, most, -lower, -least])
+    there = np.isfinite(bounds)
+    size = np.linalg.norm(rows[there], axis=1)
+    unit, bounds = rows[there] / size[:, None], bounds[there] / size
+    softness = np.tile(np.repeat([SOFT, HARD], len(L)), 2)[there]
+    y, multipliers = nearest_point(C.T @ start, unit, bounds, softness)
+    assert np.all(multipliers >= 0.0)
+    assert np.allclose(y + unit.T @ multipliers, C.T @ start)
+    over = unit @ y - bounds - softness * multipliers
+    size = 1.0 + np.max(np.abs(C.T @ start)) + np.max(np.abs(bounds), initial=0.0)
+    size += np.sum(multipliers)
+    assert np.all(over <= 1e-9 * size)
+    assert np.all(np.abs(over[multipliers > 0.0]) <= 1e-9 * size)
+    answer = nearest_acceleration(L, W, start, lower, upper, least, most)
+    assert np.allclose(C.T @ answer.acceleration, y, atol=1e-9 * size)
 
 
 @given(seeds)
-def test_it_is_the_nearest_in_the_inertia_metric(seed):
-    given_ = problem(seed)
-    ours, theirs = nearest_acceleration(*given_), by_solver(*given_)
-    L, start = given_[0], given_[1]
-    ours_far, theirs_far = (np.linalg.norm(L.T @ (x - start)) for x in (ours, theirs))
+def test_it_is_the_nearest_in_the_metric(seed):
+    L, W, start, *bounds = problem(seed)
+    ours = nearest_acceleration(L, W, start, *bounds).acceleration
+    theirs = by_solver(L, W, start, *bounds)
+    R = np.linalg.cholesky(W).T @ L.T
+    ours_far, theirs_far = (np.linalg.norm(R @ (x - start)) for x in (ours, theirs))
     assert ours_far <= theirs_far * (1.0 + 1e-4) + 1e-4
-    assert np.allclose(ours, theirs, rtol=1e-3, atol=1e-2)
+    assert np.linalg.norm(R @ (ours - theirs)) <= 1e-3 * (1.0 + theirs_far)
 
 
 @given(seeds, st.booleans())
 def test_compiled_is_readable(seed, contradictory):
-    L, start, *bounds = problem(seed, contradictory)
+    L, W, start, *bounds = problem(seed, contradictory)
     x = start.copy()
     given_ = BOUNDS.make({"n": x.size})
+    given_.W[:] = W
     for array, values in zip(given_, bounds, strict=False):
         array[:] = values
     inertia = make_inertia(np.arange(x.size) - 1).handle()
     assert factor(L @ L.T, inertia)
     compiled(inertia, x, given_.handle())
-    readable = nearest_acceleration(L, start, *bounds)
-    assert np.allclose(x, readable, rtol=1e-6, atol=1e-5)
+    readable = nearest_acceleration(L, W, start, *bounds)
+    R = np.linalg.cholesky(W).T @ L.T
+    size = 1.0 + np.linalg.norm(R @ start)
+    assert np.linalg.norm(R @ (x - readable.acceleration)) <= 1e-7 * size
+    # What softness shares between bounds that contradict each other is known to fewer digits.
+    taken = np.concatenate([readable.upper, readable.lower])
+    assert np.allclose(given_.taken[: 2 * x.size], taken, rtol=1e-3, atol=1e-3 * size)
 
 
 @given(seeds)
 def test_an_acceleration_within_bounds_is_left_alone(seed):
-    L, _, lower, upper, least, most = problem(seed)
-    middle = nearest_acceleration(L, np.zeros(len(L)), lower, upper, least, most)
-    again = nearest_acceleration(L, middle, lower, upper, least, most)
-    assert np.allclose(again, middle, rtol=1e-5, atol=1e-4)
+    L, W, _, *bounds = problem(seed)
+    middle = nearest_acceleration(L, W, np.zeros(len(L)), *bounds).acceleration
+    again = nearest_acceleration(L, W, middle, *bounds).acceleration
+    R = np.linalg.cholesky(W).T @ L.T
+    assert np.linalg.norm(R @ (again - middle)) <= 1e-5 * (1.0 + np.linalg.norm(R @ middle))
 
 
 @given(seeds, st.booleans())
 @settings(max_examples=60)
 def test_answers_are_no_further_apart_than_questions(seed, contradictory):
-    L, start, *bounds = problem(seed, contradictory)
+    L, W, start, *bounds = problem(seed, contradictory)
     other = start + np.random.default_rng(seed).normal(0.0, 1.0, start.size)
-    gap = nearest_acceleration(L, start, *bounds) - nearest_acceleration(L, other, *bounds)
-    before = np.linalg.norm(L.T @ (start - other))
-    assert np.linalg.norm(L.T @ gap) <= before * (1.0 + 1e-6) + 1e-6
+    one, two = (nearest_acceleration(L, W, x, *bounds).acceleration for x in (start, other))
+    R = np.linalg.cholesky(W).T @ L.T
+    assert np.linalg.norm(R @ (one - two)) <= np.linalg.norm(R @ (start - other)) * 1.000001 + 1e-6
 
 
 def test_contradicting_bounds_share_the_excess():
     L = np.eye(2)
     lower, upper, free = np.array([5.0, -INF]), np.array([1.0, INF]), np.full(2, INF)
-    x = nearest_acceleration(L, np.array([9.0, 2.0]), lower, upper, -free, free)
+    x = nearest_acceleration(L, L, np.array([9.0, 2.0]), lower, upper, -free, free).acceleration
     assert x == pytest.approx([3.0, 2.0], abs=1e-5)
 
 
 def test_the_motors_are_harder_than_what_joints_may_do():
     """A joint that must brake more than its motor can, brakes with all that the motor has."""
-    L = np.array([[2.0]])
-    x = nearest_acceleration(
-        L, np.array([0.0]), np.array([-INF]), np.array([-50.0]), np.array([-40.0]), np.array([40.0])
+    L, one = np.array([[2.0]]), np.ones(1)
+    found = nearest_acceleration(
+        L, np.eye(1), 0.0 * one, -INF * one, -50.0 * one, -40.0 * one, 40.0 * one
     )
-    assert x == pytest.approx([-10.0], rel=1e-3)
+    assert found.acceleration == pytest.approx([-10.0], rel=1e-3)
+    assert found.motors
 
 
 def test_without_bounds_nothing_changes():
     free = np.full(3, INF)
-    x = np.array([1.0, 2.0, 3.0])
-    assert np.array_equal(nearest_acceleration(np.eye(3), x, -free, free, -free, free), x)
+    x, one = np.array([1.0, 2.0, 3.0]), np.eye(3)
+    assert np.array_equal(
+        nearest_acceleration(one, one, x, -free, free, -free, free).acceleration, x
+    )
+
+
+def test_the_lower_level_gives_way():
+    """A bound across both levels is paid for by the lower one, up to the ratio of their weights."""
+    rng = np.random.default_rng(3)
+    J = np.eye(4)[:2], np.eye(4)[2:]
+    levels = [Level(0, frozenset([0])), Level(1, frozenset([1]))]
+    whitened = [WhitenedTask(rows, np.zeros(2)) for rows in J]
+    W = task_metric(whitened, levels, [1.0, 1.0], 4)
+    row = rng.normal(size=(1, 4))
+    row /= np.linalg.norm(row)
+    C = np.linalg.cholesky(W)
+    unit = np.linalg.solve(C, row.T).T
+    size = np.linalg.norm(unit)
+    z, _ = nearest_point(np.zeros(4), unit / size, np.array([-1.0]) / size, np.array([1e-12]))
+    moved = np.linalg.solve(C.T, z)
+    assert row @ moved == pytest.approx(-1.0)
+    price = np.abs(moved / row[0])
+    assert price[:2] == pytest.approx(price[2] * 2.0 / 11.0)
+
+
+@given(seeds)
+def test_a_level_that_comes_with_nothing_changes_nothing(seed):
+    """The metric is continuous in the activations although levels come and go."""
+    rng = np.random.default_rng(seed)
+    whitened = [WhitenedTask(rng.normal(size=(2, 5)), np.zeros(2)) for _ in range(3)]
+    levels = [Level(p, frozenset([p])) for p in range(3)]
+    h = rng.uniform(size=3)
+    for k in range(3):
+        gone = [level for level in levels if level.priority != k]
+        h[k] = 0.0
+        absent = task_metric(whitened, gone, h, 5)
+        assert np.array_equal(task_metric(whitened, levels, h, 5), absent)
+        h[k] = 1e-9
+        assert np.allclose(task_metric(whitened, levels, h, 5), absent, rtol=1e-6, atol=1e-6)

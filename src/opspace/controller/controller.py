@@ -23,7 +23,9 @@ from opspace.kernels.columns import (
     KEEP_TORQUE,
     OPTION_SIZE,
     REACH,
+    RELEASE_UPPER,
     ROOM,
+    SIGMA_DAMPING,
     SIGMA_LOWER,
     SIGMA_PROFILE,
     SIGMA_UPPER,
@@ -315,11 +317,12 @@ class Controller(ReferenceController):
 
     def _options(self) -> np.ndarray:
         option = np.zeros(OPTION_SIZE)
-        singularity = self.singularity
-        if singularity is not None:
+        buffer = self._scales.buffer
+        if buffer is not None:
             option[SINGULAR] = 1.0
-            option[SIGMA_LOWER], option[SIGMA_UPPER] = singularity.lower, singularity.upper
-            option[SIGMA_PROFILE] = PROFILES.index(singularity.profile)
+            option[SIGMA_LOWER], option[SIGMA_UPPER] = buffer.lower, buffer.upper
+            option[SIGMA_PROFILE] = PROFILES.index(buffer.profile)
+            option[RELEASE_UPPER], option[SIGMA_DAMPING] = buffer.release_upper, buffer.damping
         option[DAMPING] = self.damping
         option[TASK_BIAS] = float(self.bias == "task")
         option[ROOM], option[REACH] = self._blending.room, self._blending.reach

@@ -53,12 +53,14 @@ def level_status(
             empty = np.zeros(0)
             none = np.zeros((rows, 0))
             scale = 1.0 if report is None else report.scale
-            result.append(LevelStatus(level, names, empty, empty, none, scale))
+            result.append(LevelStatus(level, names, empty, empty, empty, none, scale))
         else:
             slots = [mixed.slots[k - first] for k in report.members]
             names = tuple(members[slot.member].task.name for slot in slots)
             s = report.spectrum
             result.append(
-                LevelStatus(level, names, s.sigma, s.activation, s.directions, report.scale)
+                LevelStatus(
+                    level, names, s.sigma, s.activation, s.response, s.directions, report.scale
+                )
             )
     return tuple(result)

@@ -9,25 +9,33 @@ from typing import NamedTuple
 import numpy as np
 
 from opspace.command import Found, Status
-from opspace.controller.bounds import nearest_torque
+from opspace.controller.bounds import Bounds, realise
 from opspace.controller.disturbance import DisturbanceObserver
-from opspace.controller.limit_task_sets import (
-    Insertion,
-    LimitTerms,
-    insertions,
-    limit_task_sets,
-    limit_terms,
-)
+from opspace.controller.limit_task_sets import LimitTerms, limit_task_sets, limit_terms
 from opspace.controller.reference_report import level_status, task_status
 from opspace.errors import InputError
-from opspace.law import LawInfo, Motors, SigmaBuffer, TaskSet, Weighted, blended_torque, corners
+from opspace.law import (
+    LawInfo,
+    Motors,
+    SigmaBuffer,
+    TaskSet,
+    Weighted,
+    blended_torque,
+    corners,
+    levels_of,
+    task_metric,
+    whiten,
+)
 from opspace.law.blending import combined
-from opspace.law.scalars import LIMIT_PASSES, SCALED
+from opspace.law.scalars import SCALED
 from opspace.plan.scales import Scales
 from opspace.robots.protocol import Robot
 from opspace.stack import Blending, Member, Mixture, mixture
 from opspace.tasks import JointLimits, PostureTask, TaskTerms, TrackingTask
 from opspace.tasks.activations import own_activation
+
+REST = ""
+"""Name of the damping of what no task uses; tasks have names."""
 
 
 class Question(NamedTuple):
@@ -41,6 +49,7 @@ class Question(NamedTuple):
         levels: Numbers of the levels by their rank.
         buffer: Where singular directions fade; None for nowhere.
         motors: Torque limits to stay inside of; None where they are not asked.
+        motion: (n,) whitened velocity Lᵀ q̇, √J.
     """
 
     L: np.ndarray
@@ -49,6 +58,7 @@ class Question(NamedTuple):
     levels: Sequence[float]
     buffer: SigmaBuffer | None
     motors: Motors | None
+    motion: np.ndarray
 
 
 Law = Callable[[Question], tuple[np.ndarray, LawInfo]]
@@ -57,8 +67,10 @@ Law = Callable[[Question], tuple[np.ndarray, LawInfo]]
 
 def sum_of_hard_torques(asked: Question) -> tuple[np.ndarray, LawInfo]:
     """Γ = Σ_T w_T H(T; f̃), the library's own law (Eq. 19-23)."""
-    L, task_sets, blend, _, buffer, motors = asked
-    return blended_torque(L, task_sets, blend, buffer, want_spectra=True, motors=motors)
+    L, task_sets, blend, _, buffer, motors, motion = asked
+    return blended_torque(
+        L, task_sets, blend, buffer, want_spectra=True, motors=motors, motion=motion
+    )
 
 
 @dataclass(frozen=True)
@@ -120,9 +132,6 @@ class Blend(NamedTuple):
     corners: Sequence[Weighted]
 
 
-NO_LIMITS = Blend((), (Weighted(1.0, frozenset()),))
-
-
 class Answer(NamedTuple):
     """Torque (n,), N·m, what happened, the number of hard torques and what there is to report."""
 
@@ -145,24 +154,16 @@ def tick(k: Given) -> Answer | None:
     if L is None:
         return None
     tasks = whiten_tasks(k, h, terms, mixed, L)
-    inserted: Mapping[int, Insertion] = {}
-    bounds: list[LimitTerms] = []
+    limits = begin_limits(k)
+    inserted = insert_limits(k)
     try:
-        gamma, info = law(k, L, mixed, tasks, NO_LIMITS)
-        if k.rules.limits is not None:
-            bounds = begin_limits(k, k.rules.limits)
-            for _ in range(LIMIT_PASSES):
-                more = insert_limits(k, bounds, accelerations(k, torque(k, gamma)), inserted)
-                if more == inserted:
-                    break
-                inserted = more
-                gamma, info = law(k, L, mixed, tasks, limit_corners(k, bounds, inserted))
-        tau, kept = keep_bounds(k, bounds, torque(k, gamma))
+        gamma, info = law(k, L, mixed, tasks, limit_corners(k, limits, inserted))
+        tau, kept, acting = keep_bounds(k, L, limits, tasks, torque(k, gamma))
     except (InputError, np.linalg.LinAlgError):
         # Everything that went in is finite: these numbers are too large to compute with.
         return None
-    active = {bounds[i].side.name: limit.activation for i, limit in inserted.items()}
-    levels = level_status(k.members, mixed, info, len(active))
+    active = {limits[i].side.name: limit for i, limit in inserted.items()} | acting
+    levels = level_status(k.members, mixed, info, len(inserted))
     found = Found(task_status(k.members, h, terms, mixed), levels, active)
     return Answer(tau, status(k, tau, info, found) | kept, info.hard_solves, found)
 
@@ -232,7 +233,7 @@ def whiten_tasks(
     # q̈ = −d v of what is left, weighed by the inertia: its momentum decays at the rate d. A
     # posture on its way in takes everything away from it, so it need not fade.
     rest = -rules.damping * (L.T @ k.v)
-    sets.append(TaskSet(L.T, rest, len(rank), 1.0, "damping", rules.scales.unit))
+    sets.append(TaskSet(L.T, rest, len(rank), 1.0, REST, rules.scales.unit))
     last = len(sets) - 1
     return Blend(sets, [Weighted(w, present | {last}) for w, present in mixed.corners])
 
@@ -251,7 +252,8 @@ def law(
     shifted = [Weighted(w, frozenset(first + i for i in here)) for w, here in tasks.corners]
     everything = combined(limits.corners, shifted)
     motors = Motors(L, start_inside(k), k.torque_limit) if rules.keep_torque else None
-    return rules.law(Question(L, sets, everything, mixed.levels, rules.scales.buffer, motors))
+    buffer, motion = rules.scales.buffer, L.T @ k.v
+    return rules.law(Question(L, sets, everything, mixed.levels, buffer, motors, motion))
 
 
 def start_inside(k: Given) -> np.ndarray:
@@ -260,35 +262,29 @@ def start_inside(k: Given) -> np.ndarray:
     return np.clip(bias, -k.torque_limit, k.torque_limit)
 
 
-def begin_limits(k: Given, limits: JointLimits) -> list[LimitTerms]:
+def begin_limits(k: Given) -> list[LimitTerms]:
     """q̈_adm of every joint limit, without what the model does not explain."""
-    observer = k.rules.observer
+    limits, observer = k.rules.limits, k.rules.observer
+    if limits is None:
+        return []
     if observer is not None:
         observer.observe(k.t, k.v)
     return limit_terms(limits, k.q, k.v, observer and observer.acceleration)
 
 
-def accelerations(k: Given, tau: np.ndarray) -> np.ndarray:
-    """q̈ = A⁻¹ (Γ − b − g) (Eq. 1)."""
-    return np.linalg.solve(k.M, tau - k.bias)
+def insert_limits(k: Given) -> dict[int, float]:
+    """Activation of the limits that take part as task sets, by index (Fig. 7)."""
+    limits = k.rules.limits
+    found = [] if limits is None else limits.presences(k.q, k.v)
+    return {i: h for i, h in enumerate(found) if h > 0.0}
 
 
-def insert_limits(
-    k: Given, bounds: Sequence[LimitTerms], acceleration: np.ndarray, known: Mapping[int, Insertion]
-) -> Mapping[int, Insertion]:
-    """Limits that the accelerations of the stack call for."""
-    assert k.rules.limits is not None
-    return insertions(k.rules.limits, bounds, k.q, k.v, acceleration, known)
-
-
-def limit_corners(
-    k: Given, bounds: Sequence[LimitTerms], inserted: Mapping[int, Insertion]
-) -> Blend:
+def limit_corners(k: Given, limits: Sequence[LimitTerms], inserted: Mapping[int, float]) -> Blend:
     """Task sets of the limits that take part, and the corners of their chain.
 
     Many joints can be near a limit at once: m + 1 corners for m of them, not 2^m.
     """
-    sets = limit_task_sets(bounds, inserted, k.v.size, k.rules.scales.joint)
+    sets = limit_task_sets(limits, inserted, k.v.size, k.rules.scales.joint)
     return Blend(sets, corners([task.activation for task in sets], "chain"))
 
 
@@ -300,17 +296,30 @@ def torque(k: Given, gamma: np.ndarray) -> np.ndarray:
 
 
 def keep_bounds(
-    k: Given, bounds: Sequence[LimitTerms], tau: np.ndarray
-) -> tuple[np.ndarray, Status]:
-    """No joint accelerates more than it may, whatever the task sets of the limits could do."""
-    limits, observer = k.rules.limits, k.rules.observer
-    kept = Status.OK
-    if limits is not None and limits.law.bound:
-        motors = k.torque_limit if k.rules.keep_torque else None
-        tau, kept = nearest_torque(bounds, k.M, k.bias, tau, motors)
+    k: Given, L: np.ndarray, limits: Sequence[LimitTerms], tasks: Blend, tau: np.ndarray
+) -> tuple[np.ndarray, Status, dict[str, float]]:
+    """Take the nearest torque with which no joint and no motor does more than it may."""
+    rules, observer = k.rules, k.rules.observer
+    kept, acting = Status.OK, {}
+    keeps = limits if rules.limits is not None and rules.limits.law.bound else []
+    if keeps or rules.keep_torque:
+        room = k.torque_limit if rules.keep_torque else np.full(k.v.size, np.inf)
+        tau, kept, acting = realise(
+            Bounds(keeps, k.M, k.bias, room, k.v), tau, lambda: metric(L, tasks)
+        )
     if observer is not None:
-        observer.remember(k.t, k.v, accelerations(k, tau))
-    return tau, kept
+        observer.remember(k.t, k.v, np.linalg.solve(k.M, tau - k.bias))
+    return tau, kept, acting
+
+
+def metric(L: np.ndarray, tasks: Blend) -> np.ndarray:
+    """W of `opspace.law.task_metric`, to which damping of the rest does not belong."""
+    shares = [0.0] * len(tasks.task_sets)
+    for weight, present in tasks.corners:
+        for i in present:
+            shares[i] += weight
+    sets = [task for task in tasks.task_sets if task.name != REST]
+    return task_metric(whiten(sets, L), levels_of(sets), shares, L.shape[0])
 
 
 def status(k: Given, tau: np.ndarray, info: LawInfo, found: Found) -> Status:

@@ -54,6 +54,8 @@ VARIABLE_SIZE = 9
     SIGMA_LOWER,
     SIGMA_UPPER,
     SIGMA_PROFILE,
+    RELEASE_UPPER,
+    SIGMA_DAMPING,
     DAMPING,
     TASK_BIAS,
     ROOM,
@@ -67,8 +69,8 @@ VARIABLE_SIZE = 9
     LIMIT_BOUND,
     LIMIT_BUFFER,
     KEEP_TORQUE,
-) = range(17)
-OPTION_SIZE = 17
+) = range(19)
+OPTION_SIZE = 19
 
 # What a tick answers when there is no torque.
 STATE_NOT_FINITE, NOT_FINITE, NOT_POSITIVE_DEFINITE = -1, -2, -3

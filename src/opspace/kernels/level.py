@@ -64,7 +64,8 @@ def solve_level(d, count, n, J, last, buffer, space):
     """Solve the rows that `project` has put before what depth ``d`` has decided.
 
     û_l = û_{l−1} + (Ĵ_l N_{l−1})⁺ (f_l − Ĵ_l û_{l−1}), for every alternative i: the i strongest
-    directions of JN JNᵀ = U Σ Uᵀ (Eq. 25), with weight h(σ_i) − h(σ_{i+1}).
+    directions of JN JNᵀ = U Σ Uᵀ (Eq. 25), each as far as it responds, with weight
+    h(σ_i) − h(σ_{i+1}).
 
     Args:
         d: Depth of the levels above in the arrays of ``space``.
@@ -72,7 +73,8 @@ def solve_level(d, count, n, J, last, buffer, space):
         n: Number of joints.
         J: (rows, n) whitened rows of every task set.
         last: Whether nothing is below, so that what is left free does not matter.
-        buffer: (on, lower, upper, profile); without ``on`` only exact dependence is removed.
+        buffer: (on, lower, upper, profile, upper edge of the release, damping), see
+            `opspace.law.SigmaBuffer`; without ``on`` only exact dependence is removed.
         space: `SPACE`; B and residual are read, u, Z, free of depth d + 1 written, or for a level
             that branches V, strength, share.
 
@@ -416,9 +418,11 @@ def _alternatives(d, m, n, used, rank, threshold, buffer, space):
     before = 1.0
     faded = 0
     for i in range(rank):
-        h = 0.0
+        h, response = 0.0, 1.0
         if buffer[0] != 0.0:
-            h = profile(int(buffer[3]), (sigma[i] * sigma[i] - buffer[1]) / (buffer[2] - buffer[1]))
+            above = sigma[i] * sigma[i] - buffer[1]
+            response = profile(int(buffer[3]), above / (buffer[2] - buffer[1]))
+            h = profile(int(buffer[3]), above / (buffer[4] - buffer[1]))
         elif sigma[i] > threshold:
             h = 1.0
         strength[d, i] = 0.0
@@ -426,7 +430,12 @@ def _alternatives(d, m, n, used, rank, threshold, buffer, space):
             total = 0.0
             for a in range(m):
                 total += C[i, a] * residual[a]
-            strength[d, i] = total / (sigma[i] * sigma[i])
+            strength[d, i] = response / h * total / (sigma[i] * sigma[i])
+            if response < 1.0 and buffer[5] > 0.0:
+                along = 0.0
+                for a in range(n):
+                    along += space.V[d, i, a] * space.motion[a]
+                strength[d, i] -= (1.0 - response) * buffer[5] * along
         if h < 1.0:
             faded = 1
         share[d, i] = before - h

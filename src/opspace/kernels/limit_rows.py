@@ -1,4 +1,4 @@
-"""Joint limits of one tick, as `opspace.controller.limit_task_sets` finds them, and what keeps them."""
+"""Joint limits of one tick: what each asks for or allows, and the projection that keeps them."""
 
 from __future__ import annotations
 
@@ -15,14 +15,15 @@ from opspace.kernels.columns import (
     LIMIT_LAW,
     LIMIT_PROFILE,
 )
-from opspace.kernels.compiled_scalars import limit_command, limit_presence, rises
+from opspace.kernels.compiled_scalars import limit_command, limit_presence
 from opspace.kernels.inertia import acceleration_of, whiten
-from opspace.kernels.projection import nearest_acceleration
-from opspace.law.scalars import BROKEN, LOST
+from opspace.kernels.projection import nearest_acceleration, task_metric
+from opspace.law.scalars import BROKEN, LOST, UNBOUNDED
 from opspace.machine.jit import jit
 
 FILTERED = int(Status.FILTERED)
 LIMIT_LOST = int(Status.LIMIT_LOST)
+SCALED = int(Status.TORQUE_SCALED)
 
 # Columns of Tick.limit: side, rad, rad/s², rad/s², rad/s², rad/s, rad/s².
 SIGN, POSITION, BRAKE, MARGIN, COMMAND, SPEED, DISTURBANCE = range(7)
@@ -30,13 +31,11 @@ SIGN, POSITION, BRAKE, MARGIN, COMMAND, SPEED, DISTURBANCE = range(7)
 
 @jit
 def begin_limits(work):
-    """Evaluate what every limit asks for, rad/s², into its row of ``limit`` (limits, 7)."""
+    """Evaluate what every limit asks for or allows, rad/s², into its row of ``limit`` (limits, 7)."""
     option = work.option
     for i in range(work.limit.shape[0]):
         limit = work.limit[i]
         j = work.limit_joint[i]
-        work.limit_h[i] = 0.0
-        work.limit_wanted[i] = -math.inf
         limit[COMMAND] = limit_command(
             int(option[LIMIT_LAW]),
             limit[SIGN] * (limit[POSITION] - work.q[j]),
@@ -53,48 +52,44 @@ def begin_limits(work):
 
 @jit
 def insert_limits(work):
-    """Find which limits take part for the accelerations found, at least as much as before.
-
-    Reads joint_acceleration (n,) and limit; writes limit_h and limit_wanted (limits,), rad/s².
+    """Activation of the limits that take part as task sets, into limit_h (limits,).
 
     Returns:
-        Whether anything changed.
+        Whether there are any.
     """
-    changed = False
+    any_limit = False
     option = work.option
     for i in range(work.limit.shape[0]):
         limit = work.limit[i]
         j = work.limit_joint[i]
-        h, wanted = limit_presence(
+        work.limit_h[i] = limit_presence(
             int(option[LIMIT_LAW]),
             limit[SIGN] * (limit[POSITION] - work.q[j]),
             limit[SIGN] * work.v[j],
             limit[BRAKE],
             option[LIMIT_BUFFER],
-            limit[SIGN] * work.joint_acceleration[j],
-            limit[COMMAND],
-            limit[MARGIN],
             int(option[LIMIT_PROFILE]),
         )
-        h, wanted = max(h, work.limit_h[i]), max(wanted, work.limit_wanted[i])
-        if h <= 0.0:
-            continue
-        if rises(h, work.limit_h[i]) or rises(wanted, work.limit_wanted[i]):
-            changed = True
-            work.limit_h[i], work.limit_wanted[i] = h, wanted
-    return changed
+        if work.limit_h[i] > 0.0:
+            any_limit = True
+    return any_limit
 
 
 @jit
-def keep_bounds(work):
-    """Replace the torque by the nearest one with which no joint accelerates more than it may.
+def keep_bounds(work, stacks):
+    """Take the nearest torque with which no joint and no motor does more than it may.
 
-    Reads and writes tau (n,), N·m, and joint_acceleration (n,), rad/s².
+    Reads and writes tau (n,), N·m, and joint_acceleration (n,), rad/s²; writes limit_h (limits,) of the
+    limits that act.
+
+    Args:
+        work: `opspace.plan.records.TICK`.
+        stacks: Number of stacks that were blended.
 
     Returns:
         What happened, in the numbers of `opspace.Status`.
     """
-    if work.option[LIMIT_BOUND] == 0.0:
+    if work.option[LIMIT_BOUND] == 0.0 and work.option[KEEP_TORQUE] == 0.0:
         return 0
     n = work.v.shape[0]
     x = work.joint_acceleration
@@ -102,9 +97,10 @@ def keep_bounds(work):
         x[a] = work.tau[a] - work.bias[a]
     whiten(work.inertia, x)
     acceleration_of(work.inertia, x)
-    if not _excess(work) > BROKEN:
-        return 0
     _bounds(work, n)
+    if not (_motors_exceeded(work, n) or _excess(work, n) > BROKEN):
+        return 0
+    task_metric(work, stacks)
     nearest_acceleration(work.inertia, x, work.bounds)
     for a in range(n):
         work.tau[a] = work.bias[a]
@@ -112,17 +108,47 @@ def keep_bounds(work):
             work.tau[a] += work.M[a, b] * x[b]
         if work.option[KEEP_TORQUE] != 0.0:
             work.tau[a] = min(max(work.tau[a], -work.torque_limit[a]), work.torque_limit[a])
-    return FILTERED | LIMIT_LOST if _excess(work) > LOST else FILTERED
+    return _acting(work, n)
 
 
 @jit
-def _excess(work):
+def _acting(work, n):
+    """Tell how much each limit acts: what it takes from its joint, as a part of its margin."""
+    bits = FILTERED
+    taken = work.bounds.taken
+    for i in range(work.limit.shape[0]):
+        limit, j = work.limit[i], work.limit_joint[i]
+        if work.option[LIMIT_BOUND] != 0.0:
+            part = taken[j] if limit[SIGN] > 0.0 else taken[n + j]
+            work.limit_h[i] = min(part / limit[MARGIN], 1.0)
+    for a in range(2 * n, 4 * n):
+        if taken[a] > 0.0:
+            bits |= SCALED
+    if _excess(work, n) > LOST:
+        bits |= LIMIT_LOST
+    return bits
+
+
+@jit
+def _motors_exceeded(work, n):
+    if work.option[KEEP_TORQUE] == 0.0:
+        return False
+    for a in range(n):
+        if abs(work.tau[a]) > work.torque_limit[a] * (1.0 + BROKEN):
+            return True
+    return False
+
+
+@jit
+def _excess(work, n):
     """The largest excess over what a joint may do, see `opspace.law.excess`."""
     most = -math.inf
-    for i in range(work.limit.shape[0]):
-        limit = work.limit[i]
-        over = limit[SIGN] * work.joint_acceleration[work.limit_joint[i]] - limit[COMMAND]
-        most = max(most, over / max(1.0, abs(limit[COMMAND])))
+    x, lower, upper = work.joint_acceleration, work.bounds.lower, work.bounds.upper
+    for a in range(n):
+        if upper[a] < UNBOUNDED:
+            most = max(most, (x[a] - upper[a]) / max(1.0, abs(upper[a])))
+        if lower[a] > -UNBOUNDED:
+            most = max(most, (lower[a] - x[a]) / max(1.0, abs(lower[a])))
     return most
 
 
@@ -136,9 +162,19 @@ def _bounds(work, n):
         if work.option[KEEP_TORQUE] != 0.0:
             bounds.least[a] = -work.torque_limit[a] - work.bias[a]
             bounds.most[a] = work.torque_limit[a] - work.bias[a]
+    if work.option[LIMIT_BOUND] == 0.0:
+        return
     for i in range(work.limit.shape[0]):
         limit, j = work.limit[i], work.limit_joint[i]
         if limit[SIGN] > 0.0:
             bounds.upper[j] = limit[COMMAND]
         else:
             bounds.lower[j] = -limit[COMMAND]
+    for a in range(
+        n
+    ):  # a joint that must stop at once need not keep its speed in the other direction
+        if bounds.lower[a] > bounds.upper[a]:
+            if work.v[a] > 0.0:
+                bounds.lower[a] = bounds.upper[a]
+            else:
+                bounds.upper[a] = bounds.lower[a]

@@ -5,7 +5,9 @@ from __future__ import annotations
 import math
 
 from opspace.kernels.algebra import cholesky, solve_lower, solve_lower_transposed
+from opspace.kernels.compiled_scalars import level_weight
 from opspace.kernels.inertia import acceleration_of, unit_row, whitened_of
+from opspace.kernels.walk import slot_bit
 from opspace.law.scalars import HARD, SOFT, UNBOUNDED
 from opspace.machine.jit import jit
 
@@ -14,28 +16,69 @@ ROUNDING = 1e-13
 
 
 @jit
-def nearest_acceleration(inertia, acceleration, bounds):
-    """Overwrite an acceleration with the nearest one within bounds.
+def task_metric(work, stacks):
+    """W = I + Σ_l ω_l Σ_{k in l} h_k Ĵ_kᵀ Ĵ_k, into bounds.W (n, n); see `opspace.law.task_metric`.
 
-    The multipliers of the bounds are found by the active-set method of Lawson and Hanson.
+    Reads the slots, the whitened rows Jw and the corners with their weights.
+    """
+    n, slots = work.v.shape[0], work.slots.shape[0]
+    W, Jw = work.bounds.W, work.Jw
+    for a in range(n):
+        for b in range(n):
+            W[a, b] = 0.0
+        W[a, a] = 1.0
+    below, absent = 0.0, 1.0
+    for s in range(slots - 1, -1, -1):
+        h = 0.0
+        for c in range(stacks):
+            if work.corner_on[c] & slot_bit(s):
+                h += work.corner_weight[c]
+        weight = level_weight(below) * h
+        for row in range(work.slots[s, 1], work.slots[s, 1] + work.slots[s, 2]):
+            for a in range(n):
+                factor = weight * Jw[row, a]
+                for b in range(a + 1):
+                    W[a, b] += factor * Jw[row, b]
+        absent *= 1.0 - h
+        if s == 0 or work.slots[s - 1, 0] != work.slots[s, 0]:
+            below += 1.0 - absent
+            absent = 1.0
+
+
+@jit
+def nearest_acceleration(inertia, acceleration, bounds):
+    """Overwrite an acceleration with the nearest one within bounds, in the metric bounds.W.
+
+    The multipliers of the bounds are found by the active-set method of Lawson and Hanson. With
+    W = C Cᵀ the point is z = Cᵀ x, x = Uᵀ q̈.
 
     Args:
         inertia: `INERTIA`, factored.
         acceleration: (n,) rad/s², overwritten.
-        bounds: `BOUNDS`: lower and upper, rad/s², least and most, N·m, are read.
+        bounds: `BOUNDS`: W, lower and upper, rad/s², least and most, N·m, are read; C and taken written.
     """
     n = acceleration.shape[0]
+    cholesky(bounds.W, n, 0.0, bounds.C)
     count = _normals(inertia, n, bounds)
-    whitened_of(inertia, acceleration, bounds.x)
+    whitened_of(inertia, acceleration, bounds.row)
+    for a in range(n):
+        bounds.x[a] = bounds.row[a] / bounds.C[a, a]  # the factor's diagonal is inverted
+        for b in range(a + 1, n):
+            bounds.x[a] += bounds.C[b, a] * bounds.row[b]
     _project(count, n, bounds)
     for a in range(n):
         acceleration[a] = bounds.y[a]
+    solve_lower_transposed(bounds.C, n, acceleration)
     acceleration_of(inertia, acceleration)
+    for a in range(4 * n):
+        bounds.taken[a] = 0.0
+    for i in range(count):
+        bounds.taken[bounds.owner[i]] = bounds.multiplier[i] * bounds.size[i]
 
 
 @jit
 def _normals(inertia, n, bounds):
-    """Write every bound that is finite as unit normal · x <= bound, with its softness.
+    """Write every bound that is finite as unit normal · z <= bound, with its softness.
 
     Returns:
         How many there are.
@@ -43,15 +86,18 @@ def _normals(inertia, n, bounds):
     count = 0
     for j in range(n):
         unit_row(inertia, j, 1.0, bounds.row)
-        count = _two_sided(count, n, bounds.lower[j], bounds.upper[j], SOFT, bounds)
+        count = _two_sided(count, n, j, bounds.lower[j], bounds.upper[j], SOFT, bounds)
         for a in range(n):
             bounds.row[a] = inertia.U[j, a]
-        count = _two_sided(count, n, bounds.least[j], bounds.most[j], HARD, bounds)
+        count = _two_sided(count, n, 2 * n + j, bounds.least[j], bounds.most[j], HARD, bounds)
     return count
 
 
 @jit
-def _two_sided(count, n, least, most, softness, bounds):
+def _two_sided(count, n, owner, least, most, softness, bounds):
+    if not (least > -UNBOUNDED or most < UNBOUNDED):
+        return count
+    solve_lower(bounds.C, n, bounds.row)
     size = 0.0
     for a in range(n):
         size += bounds.row[a] * bounds.row[a]
@@ -63,6 +109,7 @@ def _two_sided(count, n, least, most, softness, bounds):
             for a in range(n):
                 bounds.normal[count, a] = sign * bounds.row[a] / size
             bounds.bound[count], bounds.softness[count] = limit / size, softness
+            bounds.owner[count], bounds.size[count] = owner + side * n, size
             count += 1
     return count
 

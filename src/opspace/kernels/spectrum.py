@@ -7,14 +7,20 @@ from functools import partial
 import numpy as np
 
 from opspace.kernels.algebra import singular_values
-from opspace.kernels.columns import SIGMA_LOWER, SIGMA_PROFILE, SIGMA_UPPER, SINGULAR
+from opspace.kernels.columns import (
+    RELEASE_UPPER,
+    SIGMA_LOWER,
+    SIGMA_PROFILE,
+    SIGMA_UPPER,
+    SINGULAR,
+)
 from opspace.kernels.compiled_scalars import profile
 from opspace.machine.jit import jit
 
 
 @partial(jit, counted=True)
 def spectrum(B, option):
-    """Directions of a level, strongest first: σ, activation, and vectors as columns (Eq. 25)."""
+    """Directions of a level, strongest first: σ, activation, response, vectors as columns (Eq. 25)."""
     m, free = B.shape
     k = min(m, free)
     wide = m <= free
@@ -30,7 +36,7 @@ def spectrum(B, option):
     sigma = np.zeros(k)
     singular_values(C, k, C.shape[1], Y, sigma)
     directions = np.zeros((m, k))
-    activation = np.ones(k)
+    activation, response = np.ones(k), np.ones(k)
     for i in range(k):
         for a in range(m):
             if wide:
@@ -39,8 +45,7 @@ def spectrum(B, option):
                 directions[a, i] = C[i, a] / sigma[i]
         sigma[i] *= sigma[i]
         if option[SINGULAR] != 0.0:
-            lower, upper = option[SIGMA_LOWER], option[SIGMA_UPPER]
-            activation[i] = profile(
-                int(option[SIGMA_PROFILE]), (sigma[i] - lower) / (upper - lower)
-            )
-    return sigma, activation, directions
+            above, code = sigma[i] - option[SIGMA_LOWER], int(option[SIGMA_PROFILE])
+            response[i] = profile(code, above / (option[SIGMA_UPPER] - option[SIGMA_LOWER]))
+            activation[i] = profile(code, above / (option[RELEASE_UPPER] - option[SIGMA_LOWER]))
+    return sigma, activation, response, directions

@@ -32,7 +32,6 @@ from opspace.kernels.compiled_scalars import leaning, ramp
 from opspace.kernels.corners import corners, insert, sort_corners
 from opspace.kernels.dynamics import evaluate
 from opspace.kernels.inertia import (
-    acceleration_of,
     factor,
     torque_of,
     unit_row,
@@ -41,10 +40,10 @@ from opspace.kernels.inertia import (
     whitened_of,
 )
 from opspace.kernels.level import project, solve_level, take_alternative
-from opspace.kernels.limit_rows import SIGN, begin_limits, insert_limits, keep_bounds
+from opspace.kernels.limit_rows import COMMAND, SIGN, begin_limits, insert_limits, keep_bounds
 from opspace.kernels.task_rows import evaluate_tasks
 from opspace.kernels.walk import begin, keep_inside, pass_on, slot_bit, walk
-from opspace.law.scalars import CHAINED, EXACT, LIMIT_PASSES, NO_GROUP
+from opspace.law.scalars import CHAINED, EXACT, NO_GROUP
 from opspace.law.scalars import SCALED as GIVEN_WAY
 from opspace.machine.jit import jit
 
@@ -76,22 +75,17 @@ def tick(t, work):
         return NOT_POSITIVE_DEFINITE
     stacks = blend(work)
     whiten_tasks(work)
-    law(work, stacks, 0)
-    solves = stacks
+    limit_stacks = 0
     if work.limit.shape[0] > 0:
         begin_limits(work)
-        for _ in range(LIMIT_PASSES):
-            accelerations(work)
-            if not insert_limits(work):
-                break
+        if insert_limits(work):
             limit_stacks = limit_corners(work)
-            law(work, stacks, limit_stacks)
-            solves = stacks * limit_stacks
+    law(work, stacks, limit_stacks)
     torque(work)
-    kept = keep_bounds(work) if work.limit.shape[0] > 0 else 0
+    kept = keep_bounds(work, stacks)
     if not _finite(work.tau):
         return NOT_FINITE
-    return (status(work) | kept) + SOLVE * solves
+    return (status(work) | kept) + SOLVE * stacks * max(limit_stacks, 1)
 
 
 @jit
@@ -245,6 +239,8 @@ def law(work, stacks, limit_stacks):
     levels = space.u.shape[0] - 1
     if work.option[KEEP_TORQUE] != 0.0:
         start_inside(work, n)
+    if work.option[SINGULAR] != 0.0:
+        whitened_of(work.inertia, work.v, space.motion)
     for a in range(n):
         work.u[a] = 0.0
     begin(n, levels, space)
@@ -302,7 +298,7 @@ def _under_limits(work, c, stacks, levels):
 def limit_corners(work):
     """Rows of the joint limits that take part, and the corners of their chain.
 
-    Reads limit_h, limit_wanted [rad/s²]; writes limit_on (corners, limits), limit_weight (corners,).
+    Reads limit_h; writes limit_on (corners, limits), limit_weight (corners,).
 
     Returns:
         Number of corners.
@@ -335,24 +331,13 @@ def limit_corners(work):
 
 @jit
 def limit_row(work, i, row, n):
-    """Task set e_jᵀ q̈ = ± acceleration of a joint limit."""
+    """Task set e_jᵀ q̈ = ± command of a joint limit."""
     weight = work.option[LIMIT_WEIGHT]
     unit_row(work.inertia, work.limit_joint[i], weight, work.Jw[row])
-    work.fw[row] = weight * work.limit[i, SIGN] * work.limit_wanted[i]
+    work.fw[row] = weight * work.limit[i, SIGN] * work.limit[i, COMMAND]
     if work.option[TASK_BIAS] != 0.0:
         for a in range(n):
             work.fw[row] += work.Jw[row, a] * work.drop[a]
-
-
-@jit
-def accelerations(work):
-    """q̈ = A⁻¹ (Γ − b − g) (Eq. 1), (n,) rad/s², from û = U⁻¹ Γ."""
-    n = work.v.shape[0]
-    for a in range(n):
-        work.joint_acceleration[a] = work.u[a]
-        if work.option[TASK_BIAS] != 0.0:
-            work.joint_acceleration[a] -= work.drop[a]
-    acceleration_of(work.inertia, work.joint_acceleration)
 
 
 @jit

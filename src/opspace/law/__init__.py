@@ -2,7 +2,8 @@
 
 from opspace.law.activation import Activation, Buffer, Profile, Ramp
 from opspace.law.blending import BLENDINGS, Weighted, combined, corners, leaning_chain
-from opspace.law.nearest import excess, nearest_acceleration
+from opspace.law.hierarchy import levels_of, whiten
+from opspace.law.nearest import Nearest, excess, nearest_acceleration, task_metric
 from opspace.law.scalars import BROKEN, LOST, PROFILES
 from opspace.law.singular_directions import SigmaBuffer
 from opspace.law.tasksets import TaskSet
@@ -19,6 +20,7 @@ __all__ = [
     "Buffer",
     "LawInfo",
     "Motors",
+    "Nearest",
     "Profile",
     "Ramp",
     "SigmaBuffer",
@@ -30,6 +32,9 @@ __all__ = [
     "excess",
     "intermediate_values",
     "leaning_chain",
+    "levels_of",
     "nearest_acceleration",
+    "task_metric",
     "task_torque",
+    "whiten",
 ]

@@ -1,32 +1,114 @@
-"""The nearest joint acceleration within bounds: the last line behind limits that push each other."""
+"""The nearest acceleration within bounds: what the law wants, as far as it can be had."""
 
-from __future__ import annotations
+# W is the metric, not a constant; jaxtyping leaves NumPy's type parameters open.
+# pyright: strict, reportConstantRedefinition=false, reportUnknownMemberType=false
+# pyright: reportUnknownVariableType=false, reportUnknownArgumentType=false
+from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Float
 
-from opspace.law.scalars import HARD, SOFT, UNBOUNDED
+from opspace.law.hierarchy import Level, WhitenedTask
+from opspace.law.scalars import HARD, SOFT, UNBOUNDED, level_weight
+
+
+class Nearest(NamedTuple):
+    """An acceleration within bounds, and what holds it there.
+
+    Attributes:
+        acceleration: (n,) q̈, rad/s².
+        upper: (n,) by how much each upper bound on an acceleration lowers its joint's, rad/s²; 0 where
+            it does not act.
+        lower: (n,) the same of each lower bound.
+        motors: Whether a bound on a torque acts.
+    """
+
+    acceleration: Float[np.ndarray, " n"]
+    upper: Float[np.ndarray, " n"]
+    lower: Float[np.ndarray, " n"]
+    motors: bool
+
+
+def task_metric(
+    whitened: Sequence[WhitenedTask], levels: Sequence[Level], shares: Sequence[float], n: int
+) -> Float[np.ndarray, "n n"]:
+    """Measure how far an acceleration is from another by what the tasks see of the difference.
+
+        W = I + Σ_l ω_l Σ_{k in l} h_k Ĵ_kᵀ Ĵ_k,   ω_l = `level_weight` of the levels below
+
+    in x = Lᵀ q̈, where the inertia is I. A level counts as far as anything is there, 1 − Π (1 − h_k):
+    W is a polynomial in the activations and so does not step where a level comes or goes.
+
+    Args:
+        whitened: Every task set.
+        levels: Their levels, most important first.
+        shares: h_k, how much of each task set is there.
+        n: Number of joints.
+
+    Returns:
+        W, (n, n).
+    """
+    W = np.eye(n)
+    below = 0.0
+    for level in reversed(levels):
+        absent = 1.0
+        for k in sorted(level.members):
+            J = whitened[k].J
+            W += level_weight(below) * shares[k] * (J.T @ J)
+            absent *= 1.0 - shares[k]
+        below += 1.0 - absent
+    return W
+
+
+def nearest_point(
+    x: Float[np.ndarray, " n"],
+    rows: Float[np.ndarray, "k n"],
+    bounds: Float[np.ndarray, " k"],
+    softness: Float[np.ndarray, " k"],
+) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, " k"]]:
+    """Find the point nearest to x with rows · y <= bounds.
+
+        min ‖y − x‖² + Σ excess²/softness
+
+    with rows of unit length. The dual is a least-squares problem in multipliers that are not
+    negative; the answer is a continuous function of everything given.
+
+    Args:
+        x: (n,).
+        rows: (k, n) of unit length.
+        bounds: (k,) finite.
+        softness: (k,) above 0.
+
+    Returns:
+        The point, (n,), and the multipliers, (k,): it is x − rowsᵀ multipliers.
+    """
+    from scipy.optimize import nnls  # noqa: PLC0415 - slow to import, and for the readable form only
+
+    R = np.linalg.cholesky(rows @ rows.T + np.diag(softness)).T
+    multipliers, _ = nnls(R, np.linalg.solve(R.T, rows @ x - bounds))
+    return x - rows.T @ multipliers, multipliers
 
 
 def nearest_acceleration(
     L: Float[np.ndarray, "n n"],
+    W: Float[np.ndarray, "n n"],
     acceleration: Float[np.ndarray, " n"],
     lower: Float[np.ndarray, " n"],
     upper: Float[np.ndarray, " n"],
     torque_lower: Float[np.ndarray, " n"],
     torque_upper: Float[np.ndarray, " n"],
-) -> Float[np.ndarray, " n"]:
-    """Find the acceleration within bounds that is nearest in the inertia metric.
+) -> Nearest:
+    """Find the acceleration within bounds that is nearest in a metric.
 
-        min (q̈ − q̈₀)ᵀ A (q̈ − q̈₀) + Σ excess²/softness
+        min (q̈ − q̈₀)ᵀ L W Lᵀ (q̈ − q̈₀) + Σ excess²/softness
         lower <= q̈ <= upper,   torque_lower <= A q̈ <= torque_upper
 
-    with every bound taken as a unit normal in the metric. The answer is a continuous function of
-    everything given. In x = Lᵀ q̈ it is a projection; its dual is a least-squares problem in
-    multipliers that are not negative.
+    with every bound taken as a unit normal in the metric.
 
     Args:
         L: (n, n) Cholesky factor of the inertia A.
+        W: (n, n) metric in x = Lᵀ q̈, see `task_metric`.
         acceleration: (n,) q̈₀, rad/s².
         lower: (n,) least accelerations, -inf where there is none.
         upper: (n,) largest accelerations, inf where there is none.
@@ -34,24 +116,28 @@ def nearest_acceleration(
         torque_upper: (n,) largest torques beside the bias, N·m.
 
     Returns:
-        (n,) q̈, rad/s².
+        q̈ and what holds it.
     """
-    from scipy.optimize import nnls  # noqa: PLC0415 - slow to import, and for the readable form only
-
     n = acceleration.size
-    joints, motors = np.linalg.solve(L, np.eye(n)).T, L
+    C = L @ np.linalg.cholesky(W)  # L W Lᵀ = C Cᵀ, the point is z = Cᵀ q̈
+    joints = np.linalg.inv(C).T
+    motors = np.linalg.solve(C, L @ L.T).T
     rows = np.concatenate([joints, -joints, motors, -motors])
     bounds = np.concatenate([upper, -lower, torque_upper, -torque_lower])
     softness = np.repeat([SOFT, HARD], 2 * n)
     there = bounds < UNBOUNDED
+    taken = np.zeros(4 * n)
     if not np.any(there):
-        return acceleration
-    size = np.linalg.norm(rows[there], axis=1)
-    A, b = rows[there] / size[:, None], bounds[there] / size
-    x = L.T @ acceleration
-    R = np.linalg.cholesky(A @ A.T + np.diag(softness[there])).T
-    multipliers, _ = nnls(R, np.linalg.solve(R.T, A @ x - b))
-    return np.linalg.solve(L.T, x - A.T @ multipliers)
+        return Nearest(acceleration, taken[:n], taken[:n], motors=False)
+    size = np.linalg.norm(rows, axis=1)
+    unit = rows[there] / size[there, None]
+    z, multipliers = nearest_point(
+        C.T @ acceleration, unit, bounds[there] / size[there], softness[there]
+    )
+    taken[there] = multipliers * size[there]
+    return Nearest(
+        np.linalg.solve(C.T, z), taken[:n], taken[n : 2 * n], motors=bool(np.any(taken[2 * n :]))
+    )
 
 
 def excess(

@@ -172,12 +172,10 @@ def spread(y: float) -> tuple[float, float]:
 RETURN_SPEED = 0.5
 """Speed at which a joint that is outside its limits is brought back, rad/s or m/s."""
 
-LIMIT_PASSES = 4
-"""How often joint limits are inserted with the accelerations just found; each pass can find the
-joints that the ones before pushed against their own limits."""
-
-LAST_BITS = 1e-9
-"""What differs by less of itself, or by less than this, is the same."""
+STOP_WITHIN = 5e-5
+"""How far beyond its limit a joint that came too fast may come to a stop, rad or m."""
+SHORTEST_STOP = 2e-3
+"""The shortest time in which a joint is asked to stop, s."""
 
 
 ADMISSIBLE, BUFFER = range(2)
@@ -189,14 +187,13 @@ class LimitLaw(NamedTuple):
     Attributes:
         code: Its number in compiled code.
         command: (d, towards, brake, most, k1, k2, kp, buffer) → acceleration towards the limit, rad/s².
-        presence: (d, towards, brake, buffer, other, command, margin, profile) → activation h of the
-            limit's task set and what it asks for, where the joint would do ``other`` without it.
-        bound: Whether the command is the most that the joint may do, which is kept whatever happens.
+        presence: (d, towards, brake, buffer, profile) → activation h of the limit's task set.
+        bound: Whether the command is the most that the joint may do, kept by the projection.
     """
 
     code: int
     command: Callable[[float, float, float, float, float, float, float, float], float]
-    presence: Callable[[float, float, float, float, float, float, float, int], tuple[float, float]]
+    presence: Callable[[float, float, float, float, int], float]
     bound: bool
 
 
@@ -218,15 +215,25 @@ def admissible_command(
 ) -> float:  # fmt: skip
     """Evaluate q̈_adm at distance d and speed ``towards``, for the largest speed ``most``."""
     allowed, slope = allowed_speed(d, brake, k1)
-    return min(-towards * slope + k2 * (allowed - towards), k2 * (most - towards))
+    command = min(-towards * slope + k2 * (allowed - towards), k2 * (most - towards))
+    return min(command, stopping(d, towards)) if towards > max(allowed, 0.0) else command
+
+
+def stopping(d: float, towards: float) -> float:
+    """Evaluate −v²/2d, with which a joint that is faster than allowed still stops at its limit.
+
+    Where the joint is within `STOP_WITHIN` of the limit, or would have to stop sooner than in
+    `SHORTEST_STOP`, it is less, so that it stays bounded; beyond, the way back takes over.
+    """
+    way = max(d + STOP_WITHIN, 0.5 * towards * SHORTEST_STOP)
+    return -min(max(1.0 + d / STOP_WITHIN, 0.0), 1.0) * towards * towards / (2.0 * way)
 
 
 def admissible_presence(
-    d: float, towards: float, brake: float, buffer: float,
-    other: float, command: float, margin: float, code: int,
-) -> tuple[float, float]:  # fmt: skip
-    """Rise with ``other``, and ask for the smaller of both: what happens anyway pushes nobody."""
-    return profile(code, (other - (command - margin)) / margin), min(other, command)
+    d: float, towards: float, brake: float, buffer: float, code: int
+) -> float:  # fmt: skip
+    """No task set stands for the limit: it is a bound."""
+    return 0.0
 
 
 def buffer_command(
@@ -237,14 +244,11 @@ def buffer_command(
     return kp * (d - buffer) - 2.0 * math.sqrt(kp) * towards
 
 
-def buffer_presence(
-    d: float, towards: float, brake: float, buffer: float,
-    other: float, command: float, margin: float, code: int,
-) -> tuple[float, float]:  # fmt: skip
+def buffer_presence(d: float, towards: float, brake: float, buffer: float, code: int) -> float:
     """Rise with the position (Fig. 7) from the inner edge, which retreats by v²/2a, to the limit."""
     ahead = max(towards, 0.0)
     inner = buffer + ahead * ahead / (2.0 * brake)
-    return profile(code, (d - inner) / (0.0 - inner)), command
+    return profile(code, (d - inner) / (0.0 - inner))
 
 
 LIMIT_LAWS: Mapping[str, LimitLaw] = MappingProxyType(
@@ -253,8 +257,8 @@ LIMIT_LAWS: Mapping[str, LimitLaw] = MappingProxyType(
         "buffer": LimitLaw(BUFFER, buffer_command, buffer_presence, bound=False),
     }
 )
-"""``admissible``: active when the stack is about to ask for more than the joint can still brake.
-``buffer``: active by position near the limit, as in Section 4.2 of the paper."""
+"""``admissible``: a bound on what the stack may ask for, the most that the joint can still brake.
+``buffer``: a task set, active by position near the limit, as in Section 4.2 of the paper."""
 
 
 def limit_command(
@@ -268,18 +272,12 @@ def limit_command(
 
 
 def limit_presence(
-    code: int, d: float, towards: float, brake: float, buffer: float,
-    other: float, command: float, margin: float, profile_code: int,
-) -> tuple[float, float]:  # fmt: skip
-    """Evaluate activation and wish of the law with this code."""
+    code: int, d: float, towards: float, brake: float, buffer: float, profile_code: int
+) -> float:
+    """Evaluate the activation of the law with this code."""
     if code == BUFFER:
-        return buffer_presence(d, towards, brake, buffer, other, command, margin, profile_code)
-    return admissible_presence(d, towards, brake, buffer, other, command, margin, profile_code)
-
-
-def rises(x: float, before: float) -> bool:
-    """Tell whether a number is larger than before by more than its last bits."""
-    return x - before > LAST_BITS * max(1.0, abs(x))
+        return buffer_presence(d, towards, brake, buffer, profile_code)
+    return admissible_presence(d, towards, brake, buffer, profile_code)
 
 
 # --- Tracking ----------------------------------------------------------------------------------------
@@ -368,10 +366,24 @@ a level below would be all there or not at all as its torque at a saturated join
 SCALED = 1e-12
 """A level that gets less than one by more than this has given way."""
 
-SOFT = 1e-7
+LEVEL_RATIO = 10.0
+"""How much more an acceleration of a level counts than one of the level below, where not all can be
+had. A larger ratio protects the upper levels more, and makes the answer steeper: it turns into one law
+after the other, which is not continuous."""
+MOST_WEIGHT = 1e3
+"""No level counts more than this times the last one, or the answer becomes as steep as with a larger
+ratio."""
+
+
+def level_weight(below: float) -> float:
+    """Weight of a level with this many levels below it, those on their way counted in part."""
+    return min(LEVEL_RATIO**below, MOST_WEIGHT)
+
+
+SOFT = 1e-9
 """How soft bounds on accelerations are; where they contradict each other or the motors, the excess is
 shared."""
-HARD = 1e-12
+HARD = 1e-13
 """How soft bounds on torques are: softer than rounding, harder than those on accelerations."""
 BROKEN = 1e-9
 """A bound is broken by more than this part of itself, or by more than this."""

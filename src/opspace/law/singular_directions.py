@@ -23,40 +23,64 @@ from opspace.law.scalars import PROFILES, profile
 
 @dataclass(frozen=True)
 class SigmaBuffer:
-    """Buffer on the eigenvalues σ of Λ⁻¹ = J_p A⁻¹ Nᵀ J_pᵀ, Eq. 25 and Fig. 4 of the paper.
+    """Buffers on the eigenvalues σ of Λ⁻¹ = J_p A⁻¹ Nᵀ J_pᵀ, Eq. 25 and Fig. 4 of the paper.
 
-    A direction is fully active for σ >= upper, absent for σ <= lower. Eigenvalues are those of the
-    rows as the task sets scale them: with ``TaskSet.sigma_reference`` left at 1 they are in 1/kg and
-    1/(kg·m²) and the buffer is absolute, as in the paper (0.01 to 0.02); with a reference given they
-    are dimensionless multiples of it and the buffer is relative.
+    A direction near singularity has two needs. It must be asked for less, or the torque grows without
+    bound; and it must be given to the levels below, or nothing holds the arm that is stretched out. The
+    first, its *response* ρ(σ), falls from 1 at ``upper`` to 0 at ``lower``: the direction's acceleration
+    is ρ times what the tasks ask for, and 1 − ρ times damping of the joint motion along it. At rest this
+    leaves no error. The second, its *activation* h(σ), falls only from ``release`` to ``lower``.
+
+    Eigenvalues are those of the rows as the task sets scale them: with ``TaskSet.sigma_reference`` left
+    at 1 they are in 1/kg and 1/(kg·m²) and the buffer is absolute, as in the paper (0.01 to 0.02); with
+    a reference given they are dimensionless multiples of it and the buffer is relative.
 
     Args:
         lower: σ at and below which a direction is absent; must be > 0.
-        upper: σ at and above which a direction is fully active.
+        upper: σ at and above which a direction answers in full.
         profile: Name of the activation profile.
+        release: σ at and above which a direction belongs to its level alone; None is ``upper``, the one
+            buffer of the paper, in which response and activation are the same.
+        damping: d of the joint motion along a direction that answers in part, 1/s.
 
     Raises:
-        InputError: Not 0 < lower < upper.
+        InputError: Not 0 < lower < release <= upper, or a damping below 0.
         UnknownNameError: There is no such profile.
     """
 
     lower: float
     upper: float
     profile: str = "quintic"
+    release: float | None = None
+    damping: float = 0.0
 
     def __post_init__(self) -> None:
-        if not 0.0 < self.lower < self.upper < float("inf"):
+        if not 0.0 < self.lower < self.release_upper <= self.upper < float("inf"):
             raise InputError(
-                f"a sigma buffer needs 0 < lower < upper, got lower={self.lower}, upper={self.upper}"
+                "a sigma buffer needs 0 < lower < release <= upper, "
+                f"got lower={self.lower}, release={self.release}, upper={self.upper}"
             )
+        if not 0.0 <= self.damping < float("inf"):
+            raise InputError(f"the damping of a sigma buffer must be >= 0, got {self.damping}")
         Buffer(self.lower, self.upper, self.profile)
 
+    @property
+    def release_upper(self) -> float:
+        """Upper edge of the release."""
+        return self.upper if self.release is None else self.release
+
     def activation(self, sigma: float) -> float:
-        """Activation h(σ) of a direction, 0 below the buffer and 1 above."""
-        if not self.lower < sigma < self.upper:
-            return float(sigma >= self.upper)
-        s = (sigma - self.lower) / (self.upper - self.lower)
-        return profile(PROFILES.index(self.profile), s)
+        """Activation h(σ) of a direction, 0 below the buffer and 1 above the release."""
+        return self._step(sigma, self.release_upper)
+
+    def response(self, sigma: float) -> float:
+        """Response ρ(σ) of a direction, 0 below the buffer and 1 above; never more than h."""
+        return self._step(sigma, self.upper)
+
+    def _step(self, sigma: float, upper: float) -> float:
+        if not self.lower < sigma < upper:
+            return float(sigma >= upper)
+        return profile(PROFILES.index(self.profile), (sigma - self.lower) / (upper - self.lower))
 
 
 @dataclass(frozen=True)
@@ -67,11 +91,13 @@ class Spectrum:
         sigma: Eigenvalues of the projected inverse inertia, shape (k,), k = min(rows, free motions);
             empty where the certificate made the eigen-decomposition unnecessary.
         activation: Activation of each direction, shape (k,).
+        response: Response of each direction, shape (k,).
         directions: Eigenvectors as columns, in the level's stacked rows, shape (m, k).
     """
 
     sigma: Float[np.ndarray, " k"]
     activation: Float[np.ndarray, " k"]
+    response: Float[np.ndarray, " k"]
     directions: Float[np.ndarray, "m k"]
 
 
@@ -94,21 +120,27 @@ def solve_level_smoothly(
     f: Float[np.ndarray, " m"],
     above: Partial,
     buffer: SigmaBuffer,
+    motion: Float[np.ndarray, " n"],
     *,
     want_spectrum: bool = False,
 ) -> LevelOutcome:
     """Add one level whose weak directions fade out (Section 4.1 of the paper).
 
-    Direction i contributes V_i (u_iᵀ r)/√σ_i with r = f_l − Ĵ_l û_{l−1}. The level's alternatives are
-    its i strongest directions, i = 0 … k, with weights h(σ_i) − h(σ_{i+1}): the chain rule. It is
-    continuous where two eigenvalues cross and their eigenvectors are arbitrary, because the set
-    that would separate them then has weight 0.
+    With r = f_l − Ĵ_l û_{l−1} and the motion y = Lᵀ q̇, direction i contributes
+
+        V_i (ρ(σ_i)/h(σ_i) (u_iᵀ r)/√σ_i − (1 − ρ(σ_i)) d V_iᵀ y)
+
+    The level's alternatives are its i strongest directions, i = 0 … k, with weights
+    h(σ_i) − h(σ_{i+1}): the chain rule. Direction i is there with h(σ_i) in all, so that what it
+    answers to the tasks is ρ in the mean. It is continuous where two eigenvalues cross and their
+    eigenvectors are arbitrary, because the set that would separate them then has weight 0.
 
     Args:
         J: Whitened Jacobian of the level, shape (m, n).
         f: Desired value of the level, shape (m,).
         above: Result of the levels above.
         buffer: Where directions fade.
+        motion: Whitened velocity y, shape (n,).
         want_spectrum: Compute the spectrum even where the certificate makes it unnecessary.
 
     Returns:
@@ -123,9 +155,12 @@ def solve_level_smoothly(
     U, s, Vt = np.linalg.svd(JN)
     sigma = s**2
     activation = np.array([buffer.activation(x) for x in sigma.tolist()])
+    response = np.array([buffer.response(x) for x in sigma.tolist()])
     k = s.size
     strength = np.zeros(k)
-    strength[activation > 0.0] = (U[:, :k].T @ residual)[activation > 0.0] / s[activation > 0.0]
+    on = activation > 0.0
+    strength[on] = (response[on] / activation[on]) * (U[:, :k].T @ residual)[on] / s[on]
+    strength[on] -= ((1.0 - response) * buffer.damping * (Vt[:k] @ (above.Z.T @ motion)))[on]
     steps = [1.0, *activation.tolist(), 0.0]
     alternatives = [
         Alternative(
@@ -135,13 +170,13 @@ def solve_level_smoothly(
         for i in range(k + 1)
         if steps[i] > steps[i + 1]
     ]
-    return LevelOutcome(alternatives, Spectrum(sigma, activation, U[:, :k]))
+    return LevelOutcome(alternatives, Spectrum(sigma, activation, response, U[:, :k]))
 
 
 def spectrum_of(J: Float[np.ndarray, "m n"], above: Partial) -> Spectrum:
     """Directions of a level that no buffer fades: all active."""
     U, s, _ = np.linalg.svd(J @ above.Z)
-    return Spectrum(s**2, np.ones(s.size), U[:, : s.size])
+    return Spectrum(s**2, np.ones(s.size), np.ones(s.size), U[:, : s.size])
 
 
 def _certified_regular(

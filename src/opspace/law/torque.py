@@ -134,6 +134,7 @@ def blended_torque(
     *,
     want_spectra: bool = False,
     motors: Motors | None = None,
+    motion: Float[np.ndarray, " n"] | None = None,
 ) -> tuple[Float[np.ndarray, " n"], LawInfo]:
     """Compute Σ_T w_T H(T; f̃) for corners T that the caller has chosen.
 
@@ -144,6 +145,7 @@ def blended_torque(
         singular: Buffer for singular directions, or None.
         want_spectra: Report the directions of every level.
         motors: Torque limits to stay inside of, the lowest level giving way first.
+        motion: Whitened velocity Lᵀ q̇, shape (n,), which a buffer with damping needs; None is at rest.
 
     Returns:
         Torque Γ, shape (n,), N·m, and what it took.
@@ -154,6 +156,7 @@ def blended_torque(
         buffer=singular,
         want_spectra=want_spectra,
         motors=motors,
+        motion=motion,
     )
     tau = L @ walk.torque(blend, L.shape[0])
     got = {p: min(total / weight, 1.0) for p, (total, weight) in walk.report.got.items()}

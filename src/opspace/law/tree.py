@@ -89,6 +89,7 @@ class Walk:
         compensate: False for Eq. 15-16 to the letter.
         want_spectra: Compute every level's spectrum for the report, needed or not.
         motors: Scale levels, the lowest first, so that every branch stays inside the torque limits.
+        motion: Whitened velocity Lᵀ q̇, (n,), which a buffer with damping needs; None is at rest.
     """
 
     def __init__(
@@ -100,6 +101,7 @@ class Walk:
         compensate: bool = True,
         want_spectra: bool = False,
         motors: Motors | None = None,
+        motion: Float[np.ndarray, " n"] | None = None,
     ) -> None:
         self._whitened = whitened
         self._levels = levels
@@ -107,6 +109,7 @@ class Walk:
         self._compensate = compensate
         self._want_spectra = want_spectra
         self._motors = motors
+        self._motion = motion
         self.report = WalkReport()
 
     def torque(self, blend: Sequence[Weighted], n: int) -> Float[np.ndarray, " n"]:
@@ -147,6 +150,9 @@ class Walk:
         self.report.got[level.priority] = total + share * scale, weight + share
         return Partial(above.u + scale * (partial.u - above.u), partial.Z)
 
+    def _moves(self, above: Partial) -> Float[np.ndarray, " n"]:
+        return np.zeros_like(above.u) if self._motion is None else self._motion
+
     def _solve(
         self, level: Level, members: frozenset[int], above: Partial, share: float
     ) -> list[Alternative]:
@@ -160,7 +166,7 @@ class Walk:
             outcome = LevelOutcome([Alternative(1.0, partial)], spectrum)
         else:
             outcome = solve_level_smoothly(
-                J, f, above, self._buffer, want_spectrum=self._want_spectra
+                J, f, above, self._buffer, self._moves(above), want_spectrum=self._want_spectra
             )
         known = self.report.levels.get(level.priority)
         if known is None or share > known.weight:

@@ -112,11 +112,11 @@ class CompiledReport:
             rows = sum(member.task.rows for member in members)
             empty = np.zeros(0)
             names = tuple(member.task.name for member in members)
-            return LevelStatus(level, names, empty, empty, np.zeros((rows, 0)), scale)
+            return LevelStatus(level, names, empty, empty, empty, np.zeros((rows, 0)), scale)
         present = [s for s in here if int(chosen) & slot_bit.py_func(s)]
         packed = [plan.packed[plan.places[s][1]] for s in present]
         first, rows = int(plan.first_kept[depth]), sum(p.task.rows for p in packed)
         B = kept[first : first + rows, : int(width)]
-        sigma, activation, directions = spectrum(np.array(B), plan.tick.option)
+        sigma, activation, response, directions = spectrum(np.array(B), plan.tick.option)
         names = tuple(p.task.name for p in packed)
-        return LevelStatus(level, names, sigma, activation, directions, scale)
+        return LevelStatus(level, names, sigma, activation, response, directions, scale)

@@ -13,6 +13,9 @@ from opspace.plan.calibration import Calibration, Workspace
 from opspace.robots.protocol import Robot
 from opspace.tasks import JointTask, PostureTask, Task
 
+RELEASE = 0.45
+"""Part of the default buffer in which a direction is released."""
+
 
 @dataclass(frozen=True)
 class Singularity:
@@ -23,26 +26,49 @@ class Singularity:
     separately for rows in metres and in radians. One default then serves every robot. With
     ``scale="absolute"`` they are in 1/kg and 1/(kg·m²), as in the paper.
 
+    A direction inside the buffer answers less and is damped, but arrives; only inside the lower part of
+    the buffer, the release, do the levels below get its motion, see `opspace.law.SigmaBuffer`.
+
     Args:
         lower: σ at and below which a direction is absent.
         upper: σ at and above which a direction is fully active.
         scale: ``"relative"`` or ``"absolute"``.
         profile: Name of the activation profile.
+        release: Part of the buffer, from its lower edge, in which a direction is released to the levels
+            below. 1 is the one buffer of the paper, in which directions are released wherever they
+            fade, and a task that rests inside it keeps an error. None is 1 where the scale is
+            absolute, else `RELEASE`.
+        damping: Of the joint motion along a direction that answers in part, 1/s; none with release 1.
 
     Raises:
-        InputError: Not 0 < lower < upper.
+        InputError: Not 0 < lower < upper, not 0 < release <= 1, or a damping below 0.
         UnknownNameError: An unknown scale or profile.
     """
 
-    lower: float = 0.1
+    lower: float = 0.05
     upper: float = 0.6
     scale: str = "relative"
     profile: str = "quintic"
+    release: float | None = None
+    damping: float = 20.0
 
     def __post_init__(self) -> None:
-        SigmaBuffer(self.lower, self.upper, self.profile)
         if self.scale not in ("relative", "absolute"):
             raise unknown_name("scale", self.scale, ("relative", "absolute"))
+        if self.release is not None and not 0.0 < self.release <= 1.0:
+            raise InputError(f"release is a part of the buffer, 0 to 1, got {self.release}")
+        _ = self.buffer
+
+    @property
+    def buffer(self) -> SigmaBuffer:
+        """The buffers as numbers."""
+        part = self.release
+        if part is None:
+            part = 1.0 if self.scale == "absolute" else RELEASE
+        if part == 1.0:
+            return SigmaBuffer(self.lower, self.upper, self.profile)
+        edge = self.lower + part * (self.upper - self.lower)
+        return SigmaBuffer(self.lower, self.upper, self.profile, edge, self.damping)
 
 
 DEFAULT_SINGULARITY = Singularity()
@@ -65,7 +91,7 @@ class Scales:
         # Rows of Lᵀ have σ = 1 in whatever is left; this puts them above any buffer.
         self.joint, self.unit = 1.0, 1.0
         if option is not None:
-            self.buffer = SigmaBuffer(option.lower, option.upper, option.profile)
+            self.buffer = option.buffer
             # A⁻¹ has no eigenvalue below joint_sigma: joint rows scaled like this are never
             # singular.
             self.joint = 0.5 * self._workspace.joint_sigma / option.upper

@@ -218,4 +218,6 @@ def _singularity(scenario: Scenario) -> Singularity | None:
     if option is None or scenario.method == "none":
         return None
     profile = SWITCH if scenario.method == "switch" else option.profile
-    return Singularity(option.lower, option.upper, option.scale, profile)
+    return Singularity(
+        option.lower, option.upper, option.scale, profile, option.release, option.damping
+    )

@@ -1,4 +1,4 @@
-"""Joint limits as task sets, one per joint and side, inserted only while they are needed."""
+"""Joint limits, one per joint and side: bounds on what the stack may do, or task sets."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class Side:
 
 
 class JointLimits(KnownAttributes):
-    r"""Keep joints inside their limits by task sets at the highest priority.
+    r"""Keep joints inside their limits, whatever the tasks ask for.
 
     With d the distance to the limit, v the joint's speed towards it and a the braking acceleration,
 
@@ -62,12 +62,9 @@ class JointLimits(KnownAttributes):
     is the largest acceleration towards the limit from which the joint still stops at it, and with
     which it does not become faster than v_max.
 
-    In mode ``admissible`` a joint gets the smaller of q̈_adm and a_other, its acceleration under
-    the stack without this limit: the task set asks for min(a_other, q̈_adm), with the activation
-    h = profile((a_other − (q̈_adm − margin)) / margin). While a_other is the smaller, inserting a
-    task set that asks for what happens anyway changes nothing, so the whole range is usable, and
-    the limit only ever pushes inwards and lets go by itself. The activation is for the levels
-    below: their singular directions see the inserted row.
+    In mode ``admissible`` it is a bound: the controller answers the acceleration nearest to what the
+    stack wants among those that no joint's q̈_adm forbids, see `opspace.law.nearest`. The whole
+    range is usable, and a limit only ever pushes inwards and lets go by itself.
 
     In mode ``buffer`` the activation rises with the position, from 0 at the inner edge of the buffer
     to 1 at the limit (Section 4.2, Fig. 7), and the task set pulls back to the inner edge; a target
@@ -182,7 +179,7 @@ class JointLimits(KnownAttributes):
         return lower, upper
 
     def margin(self, side: Side) -> float:
-        """Width of the activation's rise on the acceleration, rad/s² or m/s²."""
+        """Acceleration that a limit takes from its joint when told fully active, rad/s² or m/s²."""
         return 0.25 * side.brake
 
     def admissible(self, side: Side, position: float, speed: float) -> float:
@@ -201,41 +198,27 @@ class JointLimits(KnownAttributes):
             d, towards, side.brake, side.speed, self.k1, self.k2, self.kp, self.buffer
         )
 
-    def presence(
-        self, side: Side, position: float, speed: float, other: float, command: float
-    ) -> tuple[float, float]:
-        """Activation of a limit's task set, and what it asks for.
+    def presence(self, side: Side, position: float, speed: float) -> float:
+        """Activation of a limit's task set, 0 to 1; in mode ``admissible`` there is none.
 
         Args:
             side: The limit.
             position: Joint position, rad or m.
             speed: Joint velocity, rad/s or m/s.
-            other: Acceleration towards the limit that the joint has without this limit, rad/s².
-            command: What `admissible` gave, less what the model does not explain.
-
-        Returns:
-            h, 0 to 1, and the acceleration towards the limit, rad/s².
         """
         d, towards = side.sign * (side.limit - position), side.sign * speed
         code = PROFILES.index(self.profile)
-        return self.law.presence(
-            d, towards, side.brake, self.buffer, other, command, self.margin(side), code
-        )
+        return self.law.presence(d, towards, side.brake, self.buffer, code)
 
     def commands(self, q: Array, v: Array) -> list[float]:
         """Evaluate `admissible` of every side at positions (n,) and velocities (n,)."""
         positions, speeds = q.tolist(), v.tolist()
         return [self.admissible(s, positions[s.index], speeds[s.index]) for s in self.sides]
 
-    def presences(
-        self, q: Array, v: Array, acceleration: Array, commands: Sequence[float]
-    ) -> list[tuple[float, float]]:
-        """Evaluate `presence` of every side for these joint accelerations, (n,) rad/s²."""
-        positions, speeds, other = q.tolist(), v.tolist(), acceleration.tolist()
-        return [
-            self.presence(s, positions[s.index], speeds[s.index], s.sign * other[s.index], command)
-            for s, command in zip(self.sides, commands, strict=True)
-        ]
+    def presences(self, q: Array, v: Array) -> list[float]:
+        """Evaluate `presence` of every side at positions (n,) and velocities (n,)."""
+        positions, speeds = q.tolist(), v.tolist()
+        return [self.presence(s, positions[s.index], speeds[s.index]) for s in self.sides]
 
     def allowed_speed(self, side: Side, distance: float) -> float:
         """Speed towards a limit from which the joint still stops at it, v_adm(d), rad/s or m/s."""
