@@ -8,7 +8,7 @@ from opspace.kernels.algebra import cholesky, solve_lower, solve_lower_transpose
 from opspace.kernels.compiled_scalars import level_weight
 from opspace.kernels.inertia import acceleration_of, unit_row, whitened_of
 from opspace.kernels.walk import slot_bit
-from opspace.law.scalars import HARD, SOFT, UNBOUNDED
+from opspace.law.scalars import CLEANINGS, HARD, SOFT, UNBOUNDED
 from opspace.machine.jit import jit
 
 ROUNDING = 1e-13
@@ -65,15 +65,18 @@ def nearest_acceleration(inertia, acceleration, bounds):
         bounds.x[a] = bounds.row[a] / bounds.C[a, a]  # the factor's diagonal is inverted
         for b in range(a + 1, n):
             bounds.x[a] += bounds.C[b, a] * bounds.row[b]
-    _project(count, n, bounds)
+    for a in range(4 * n):
+        bounds.taken[a] = 0.0
+    for _ in range(CLEANINGS):
+        _project(count, n, bounds)
+        for a in range(n):
+            bounds.x[a] = bounds.y[a]
+        for i in range(count):
+            bounds.taken[bounds.owner[i]] += bounds.multiplier[i] * bounds.size[i]
     for a in range(n):
         acceleration[a] = bounds.y[a]
     solve_lower_transposed(bounds.C, n, acceleration)
     acceleration_of(inertia, acceleration)
-    for a in range(4 * n):
-        bounds.taken[a] = 0.0
-    for i in range(count):
-        bounds.taken[bounds.owner[i]] = bounds.multiplier[i] * bounds.size[i]
 
 
 @jit

@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Float
 
 from opspace.law.hierarchy import Level, WhitenedTask
-from opspace.law.scalars import HARD, SOFT, UNBOUNDED, level_weight
+from opspace.law.scalars import CLEANINGS, HARD, SOFT, UNBOUNDED, level_weight
 
 
 class Nearest(NamedTuple):
@@ -104,7 +104,8 @@ def nearest_acceleration(
         min (q̈ − q̈₀)ᵀ L W Lᵀ (q̈ − q̈₀) + Σ excess²/softness
         lower <= q̈ <= upper,   torque_lower <= A q̈ <= torque_upper
 
-    with every bound taken as a unit normal in the metric.
+    with every bound taken as a unit normal in the metric; what softness leaves of the excess where much
+    is asked for is projected away again.
 
     Args:
         L: (n, n) Cholesky factor of the inertia A.
@@ -131,10 +132,10 @@ def nearest_acceleration(
         return Nearest(acceleration, taken[:n], taken[:n], motors=False)
     size = np.linalg.norm(rows, axis=1)
     unit = rows[there] / size[there, None]
-    z, multipliers = nearest_point(
-        C.T @ acceleration, unit, bounds[there] / size[there], softness[there]
-    )
-    taken[there] = multipliers * size[there]
+    z = C.T @ acceleration
+    for _ in range(CLEANINGS):
+        z, multipliers = nearest_point(z, unit, bounds[there] / size[there], softness[there])
+        taken[there] += multipliers * size[there]
     return Nearest(
         np.linalg.solve(C.T, z), taken[:n], taken[n : 2 * n], motors=bool(np.any(taken[2 * n :]))
     )

@@ -174,7 +174,7 @@ RETURN_SPEED = 0.5
 
 STOP_WITHIN = 5e-5
 """How far beyond its limit a joint that came too fast may come to a stop, rad or m."""
-SHORTEST_STOP = 2e-3
+SHORTEST_STOP = 1e-3
 """The shortest time in which a joint is asked to stop, s."""
 
 
@@ -383,6 +383,9 @@ def level_weight(below: float) -> float:
 SOFT = 1e-9
 """How soft bounds on accelerations are; where they contradict each other or the motors, the excess is
 shared."""
+CLEANINGS = 2
+"""How often the projection is made: the second one starts from the answer of the first, and what the
+first leaves of an excess because its bounds are soft becomes smaller by their softness."""
 HARD = 1e-13
 """How soft bounds on torques are: softer than rounding, harder than those on accelerations."""
 BROKEN = 1e-9
