@@ -222,11 +222,12 @@ def admissible_command(
 def stopping(d: float, towards: float) -> float:
     """Evaluate −v²/2d, with which a joint that is faster than allowed still stops at its limit.
 
-    Where the joint is within `STOP_WITHIN` of the limit, or would have to stop sooner than in
-    `SHORTEST_STOP`, it is less, so that it stays bounded; beyond, the way back takes over.
+    It stops `STOP_WITHIN` beyond, and in no less than `SHORTEST_STOP`, so that what is asked for stays
+    bounded. It is gone at three times `STOP_WITHIN`: further outside, the way back takes over.
     """
     way = max(d + STOP_WITHIN, 0.5 * towards * SHORTEST_STOP)
-    return -min(max(1.0 + d / STOP_WITHIN, 0.0), 1.0) * towards * towards / (2.0 * way)
+    share = min(max(1.5 + 0.5 * d / STOP_WITHIN, 0.0), 1.0)
+    return -share * towards * towards / (2.0 * way)
 
 
 def admissible_presence(
