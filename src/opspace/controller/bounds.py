@@ -21,7 +21,6 @@ class Bounds:
         M: (n, n) inertia.
         bias: (n,) Coriolis, centrifugal and gravity torque, N·m.
         room: (n,) what the motors give, N·m; inf where they are not asked.
-        v: (n,) velocities, rad/s.
         lower: (n,) least accelerations, rad/s².
         upper: (n,) largest accelerations, rad/s².
     """
@@ -30,7 +29,6 @@ class Bounds:
     M: np.ndarray
     bias: np.ndarray
     room: np.ndarray
-    v: np.ndarray
     lower: np.ndarray = field(init=False)
     upper: np.ndarray = field(init=False)
 
@@ -41,12 +39,6 @@ class Bounds:
                 upper[term.side.index] = term.command
             else:
                 lower[term.side.index] = -term.command
-        # A joint that must stop at once need not keep its speed in the other direction.
-        clash = lower > upper
-        lower, upper = (
-            np.where(clash & (self.v > 0.0), upper, lower),
-            np.where(clash & (self.v <= 0.0), lower, upper),
-        )
         object.__setattr__(self, "lower", lower)
         object.__setattr__(self, "upper", upper)
 

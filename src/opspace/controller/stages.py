@@ -304,9 +304,7 @@ def keep_bounds(
     keeps = limits if rules.limits is not None and rules.limits.law.bound else []
     if keeps or rules.keep_torque:
         room = k.torque_limit if rules.keep_torque else np.full(k.v.size, np.inf)
-        tau, kept, acting = realise(
-            Bounds(keeps, k.M, k.bias, room, k.v), tau, lambda: metric(L, tasks)
-        )
+        tau, kept, acting = realise(Bounds(keeps, k.M, k.bias, room), tau, lambda: metric(L, tasks))
     if observer is not None:
         observer.remember(k.t, k.v, np.linalg.solve(k.M, tau - k.bias))
     return tau, kept, acting

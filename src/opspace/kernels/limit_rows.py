@@ -170,11 +170,3 @@ def _bounds(work, n):
             bounds.upper[j] = limit[COMMAND]
         else:
             bounds.lower[j] = -limit[COMMAND]
-    for a in range(
-        n
-    ):  # a joint that must stop at once need not keep its speed in the other direction
-        if bounds.lower[a] > bounds.upper[a]:
-            if work.v[a] > 0.0:
-                bounds.lower[a] = bounds.upper[a]
-            else:
-                bounds.upper[a] = bounds.lower[a]

@@ -172,12 +172,6 @@ def spread(y: float) -> tuple[float, float]:
 RETURN_SPEED = 0.5
 """Speed at which a joint that is outside its limits is brought back, rad/s or m/s."""
 
-STOP_WITHIN = 5e-5
-"""How far beyond its limit a joint that came too fast may come to a stop, rad or m."""
-SHORTEST_STOP = 1e-3
-"""The shortest time in which a joint is asked to stop, s."""
-
-
 ADMISSIBLE, BUFFER = range(2)
 
 
@@ -215,19 +209,7 @@ def admissible_command(
 ) -> float:  # fmt: skip
     """Evaluate q̈_adm at distance d and speed ``towards``, for the largest speed ``most``."""
     allowed, slope = allowed_speed(d, brake, k1)
-    command = min(-towards * slope + k2 * (allowed - towards), k2 * (most - towards))
-    return min(command, stopping(d, towards)) if towards > max(allowed, 0.0) else command
-
-
-def stopping(d: float, towards: float) -> float:
-    """Evaluate −v²/2d, with which a joint that is faster than allowed still stops at its limit.
-
-    It stops `STOP_WITHIN` beyond, and in no less than `SHORTEST_STOP`, so that what is asked for stays
-    bounded. It is gone at three times `STOP_WITHIN`: further outside, the way back takes over.
-    """
-    way = max(d + STOP_WITHIN, 0.5 * towards * SHORTEST_STOP)
-    share = min(max(1.5 + 0.5 * d / STOP_WITHIN, 0.0), 1.0)
-    return -share * towards * towards / (2.0 * way)
+    return min(-towards * slope + k2 * (allowed - towards), k2 * (most - towards))
 
 
 def admissible_presence(
@@ -381,13 +363,13 @@ def level_weight(below: float) -> float:
     return min(LEVEL_RATIO**below, MOST_WEIGHT)
 
 
-SOFT = 1e-9
+SOFT = 1e-7
 """How soft bounds on accelerations are; where they contradict each other or the motors, the excess is
 shared."""
 CLEANINGS = 2
 """How often the projection is made: the second one starts from the answer of the first, and what the
 first leaves of an excess because its bounds are soft becomes smaller by their softness."""
-HARD = 1e-13
+HARD = 1e-12
 """How soft bounds on torques are: softer than rounding, harder than those on accelerations."""
 BROKEN = 1e-9
 """A bound is broken by more than this part of itself, or by more than this."""

@@ -56,9 +56,11 @@ class SigmaBuffer:
 
     def __post_init__(self) -> None:
         if not 0.0 < self.lower < self.release_upper <= self.upper < float("inf"):
+            between = "" if self.release is None else "release <= "
+            found = "" if self.release is None else f", release={self.release}"
             raise InputError(
-                "a sigma buffer needs 0 < lower < release <= upper, "
-                f"got lower={self.lower}, release={self.release}, upper={self.upper}"
+                f"a sigma buffer needs 0 < lower < {between}upper, "
+                f"got lower={self.lower}, upper={self.upper}{found}"
             )
         if not 0.0 <= self.damping < float("inf"):
             raise InputError(f"the damping of a sigma buffer must be >= 0, got {self.damping}")

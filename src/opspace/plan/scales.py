@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import weakref
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -12,9 +12,6 @@ from opspace.law import SigmaBuffer
 from opspace.plan.calibration import Calibration, Workspace
 from opspace.robots.protocol import Robot
 from opspace.tasks import JointTask, PostureTask, Task
-
-RELEASE = 0.45
-"""Part of the default buffer in which a direction is released."""
 
 
 @dataclass(frozen=True)
@@ -26,8 +23,10 @@ class Singularity:
     separately for rows in metres and in radians. One default then serves every robot. With
     ``scale="absolute"`` they are in 1/kg and 1/(kg·m²), as in the paper.
 
-    A direction inside the buffer answers less and is damped, but arrives; only inside the lower part of
-    the buffer, the release, do the levels below get its motion, see `opspace.law.SigmaBuffer`.
+    With ``release`` below 1 a direction inside the buffer answers less and is damped, but arrives, and
+    only in the lower part of the buffer do the levels below get its motion, see
+    `opspace.law.SigmaBuffer`: fewer reachable targets rest with an error, and an arm that has been
+    stretched out comes back later.
 
     Args:
         lower: σ at and below which a direction is absent.
@@ -36,8 +35,7 @@ class Singularity:
         profile: Name of the activation profile.
         release: Part of the buffer, from its lower edge, in which a direction is released to the levels
             below. 1 is the one buffer of the paper, in which directions are released wherever they
-            fade, and a task that rests inside it keeps an error. None is 1 where the scale is
-            absolute, else `RELEASE`.
+            fade, and a task that rests inside it keeps an error.
         damping: Of the joint motion along a direction that answers in part, 1/s; none with release 1.
 
     Raises:
@@ -45,29 +43,26 @@ class Singularity:
         UnknownNameError: An unknown scale or profile.
     """
 
-    lower: float = 0.05
+    lower: float = 0.1
     upper: float = 0.6
     scale: str = "relative"
     profile: str = "quintic"
-    release: float | None = None
-    damping: float = 20.0
+    release: float = 1.0
+    damping: float = field(default=20.0, repr=False)
 
     def __post_init__(self) -> None:
         if self.scale not in ("relative", "absolute"):
             raise unknown_name("scale", self.scale, ("relative", "absolute"))
-        if self.release is not None and not 0.0 < self.release <= 1.0:
+        if not 0.0 < self.release <= 1.0:
             raise InputError(f"release is a part of the buffer, 0 to 1, got {self.release}")
         _ = self.buffer
 
     @property
     def buffer(self) -> SigmaBuffer:
         """The buffers as numbers."""
-        part = self.release
-        if part is None:
-            part = 1.0 if self.scale == "absolute" else RELEASE
-        if part == 1.0:
+        if self.release == 1.0:
             return SigmaBuffer(self.lower, self.upper, self.profile)
-        edge = self.lower + part * (self.upper - self.lower)
+        edge = self.lower + self.release * (self.upper - self.lower)
         return SigmaBuffer(self.lower, self.upper, self.profile, edge, self.damping)
 
 

@@ -31,7 +31,7 @@ class SingularityEntry(Entry):
     """
 
     lower: Annotated[float, Number("1", above=0.0)] = Field(
-        default=0.05, description="eigenvalue at and below which a direction is absent"
+        default=0.1, description="eigenvalue at and below which a direction is absent"
     )
     upper: Annotated[float, Number("1", above=0.0)] = Field(
         default=0.6, description="eigenvalue at and above which a direction is fully active"
@@ -41,10 +41,9 @@ class SingularityEntry(Entry):
         description="multiples of what is usual in the workspace, or absolute [1/kg, 1/(kg·m²)]",
     )
     profile: ProfileName = Field(default="quintic", description="shape of the activation")
-    release: Annotated[float, Number("1", above=0.0, at_most=1.0)] | None = Field(
-        default=None,
-        description="part of the buffer in which directions are released to lower levels; null is 1 "
-        "for the absolute scale and 0.45 for the relative one",
+    release: Annotated[float, Number("1", above=0.0, at_most=1.0)] = Field(
+        default=1.0,
+        description="part of the buffer in which directions are released to lower levels",
     )
     damping: Annotated[float, Number("1/s", at_least=0.0)] = Field(
         default=20.0, description="of the joint motion along a direction that answers in part"
