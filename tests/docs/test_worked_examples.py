@@ -29,7 +29,7 @@ def torques(form):
     arm = osc.load_robot("puma560")
     q, v = arm.q_reference, np.full(6, 0.3)
     limits = osc.JointLimits(0.2, mode="creep", joints={"joint1": (-0.1, 0.1)})
-    stack = osc.Stack([limits, osc.PositionTask(), osc.PostureTask()])
+    stack = osc.Stack([limits, osc.PositionTask(kp=1.0), osc.PostureTask(kp=1.0)])
     controller = form(arm, stack)
     stack.insert(osc.UprightTask(max_speed=0.5), level=0, duration=0.01, profile="septic")
     return [controller.step(0.001 * i, q + 0.0003 * i, v) for i in range(12)]

@@ -11,7 +11,7 @@ from opspace.kernels.projection import nearest_acceleration as compiled
 from opspace.law import nearest_acceleration, task_metric
 from opspace.law.hierarchy import Level, WhitenedTask
 from opspace.law.nearest import nearest_point
-from opspace.law.scalars import HARD, SOFT
+from opspace.law.scalars import CLEANINGS, HARD, SOFT
 from opspace.plan.memory import make_inertia
 from opspace.plan.records import BOUNDS
 
@@ -82,6 +82,8 @@ def test_a_bound_is_exceeded_by_its_softness_times_what_holds_it(seed, contradic
     assert np.all(over <= 1e-9 * size)
     assert np.all(np.abs(over[multipliers > 0.0]) <= 1e-9 * size)
     answer = nearest_acceleration(L, W, start, lower, upper, least, most)
+    for _ in range(CLEANINGS - 1):
+        y, _ = nearest_point(y, unit, bounds, softness)
     assert np.allclose(C.T @ answer.acceleration, y, atol=1e-9 * size)
 
 
@@ -101,15 +103,16 @@ def test_compiled_is_readable(seed, contradictory):
     L, W, start, *bounds = problem(seed, contradictory)
     x = start.copy()
     given_ = BOUNDS.make({"n": x.size})
-    given_.W[:] = W
     for array, values in zip(given_, bounds, strict=False):
         array[:] = values
-    inertia = make_inertia(np.arange(x.size) - 1).handle()
-    assert factor(L @ L.T, inertia)
-    compiled(inertia, x, given_.handle())
+    inertia = make_inertia(np.arange(x.size) - 1)
+    assert factor(L @ L.T, inertia.handle())
+    change = np.linalg.solve(np.triu(inertia.U), L)  # it factors the inertia from the other end
+    given_.W[:] = change @ W @ change.T
+    compiled(inertia.handle(), x, given_.handle())
     readable = nearest_acceleration(L, W, start, *bounds)
     R = np.linalg.cholesky(W).T @ L.T
-    size = 1.0 + np.linalg.norm(R @ start)
+    size = 1.0 + np.linalg.norm(R @ start) + np.linalg.norm(R @ readable.acceleration)
     assert np.linalg.norm(R @ (x - readable.acceleration)) <= 1e-7 * size
     # What softness shares between bounds that contradict each other is known to fewer digits.
     taken = np.concatenate([readable.upper, readable.lower])

@@ -8,11 +8,8 @@ from opspace.kernels.algebra import cholesky, solve_lower, solve_lower_transpose
 from opspace.kernels.compiled_scalars import level_weight
 from opspace.kernels.inertia import acceleration_of, unit_row, whitened_of
 from opspace.kernels.walk import slot_bit
-from opspace.law.scalars import CLEANINGS, HARD, SOFT, UNBOUNDED
+from opspace.law.scalars import CLEANINGS, HARD, ROUNDING, SOFT, UNBOUNDED
 from opspace.machine.jit import jit
-
-ROUNDING = 1e-13
-"""A bound that is broken by less than this part of the numbers involved is kept."""
 
 
 @jit

@@ -3,6 +3,7 @@
 # W is the metric, not a constant; jaxtyping leaves NumPy's type parameters open.
 # pyright: strict, reportConstantRedefinition=false, reportUnknownMemberType=false
 # pyright: reportUnknownVariableType=false, reportUnknownArgumentType=false
+# pyright: reportMissingTypeStubs=false
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -10,7 +11,7 @@ import numpy as np
 from jaxtyping import Float
 
 from opspace.law.hierarchy import Level, WhitenedTask
-from opspace.law.scalars import CLEANINGS, HARD, SOFT, UNBOUNDED, level_weight
+from opspace.law.scalars import CLEANINGS, HARD, ROUNDING, SOFT, UNBOUNDED, level_weight
 
 
 class Nearest(NamedTuple):
@@ -85,8 +86,11 @@ def nearest_point(
     """
     from scipy.optimize import nnls  # noqa: PLC0415 - slow to import, and for the readable form only
 
-    R = np.linalg.cholesky(rows @ rows.T + np.diag(softness)).T
-    multipliers, _ = nnls(R, np.linalg.solve(R.T, rows @ x - bounds))
+    if not np.any(rows @ x - bounds > ROUNDING * (np.abs(bounds) + np.abs(rows) @ np.abs(x))):
+        return x, np.zeros(bounds.size)
+    soft = np.sqrt(softness)
+    dual = np.concatenate([rows.T, np.diag(soft)])
+    multipliers, _ = nnls(dual, np.concatenate([x, -bounds / soft]))
     return x - rows.T @ multipliers, multipliers
 
 

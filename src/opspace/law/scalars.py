@@ -366,11 +366,13 @@ def level_weight(below: float) -> float:
 SOFT = 1e-7
 """How soft bounds on accelerations are; where they contradict each other or the motors, the excess is
 shared."""
-CLEANINGS = 2
-"""How often the projection is made: the second one starts from the answer of the first, and what the
-first leaves of an excess because its bounds are soft becomes smaller by their softness."""
+CLEANINGS = 3
+"""How often the projection is made: each one starts from the answer of the one before, and what that
+left of an excess because its bounds are soft becomes smaller by their softness."""
 HARD = 1e-12
 """How soft bounds on torques are: softer than rounding, harder than those on accelerations."""
+ROUNDING = 1e-13
+"""A bound that is broken by less than this part of the numbers involved is kept."""
 BROKEN = 1e-9
 """A bound is broken by more than this part of itself, or by more than this."""
 LOST = 1e-3
