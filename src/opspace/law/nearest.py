@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from opspace.law.hierarchy import Level, WhitenedTask
 from opspace.law.scalars import CLEANINGS, HARD, ROUNDING, SOFT, UNBOUNDED, level_weight
@@ -84,14 +84,44 @@ def nearest_point(
     Returns:
         The point, (n,), and the multipliers, (k,): it is x − rowsᵀ multipliers.
     """
-    from scipy.optimize import nnls  # noqa: PLC0415 - slow to import, and for the readable form only
+    gap = rows @ x - bounds
+    rounding = ROUNDING * (np.abs(bounds) + np.abs(rows) @ np.abs(x))
+    y, multipliers, held = x, np.zeros(bounds.size), np.zeros(bounds.size, dtype=bool)
+    for _ in range(10 * bounds.size):
+        over = np.where(held, 0.0, rows @ y - bounds)
+        broken = over > rounding
+        if not np.any(broken):
+            break
+        held[np.argmax(np.where(broken, over, 0.0))] = True
+        while not _hold(rows, gap, softness, held, multipliers):
+            held &= multipliers > 0.0
+        y = x - rows.T @ multipliers
+    return y, multipliers
 
-    if not np.any(rows @ x - bounds > ROUNDING * (np.abs(bounds) + np.abs(rows) @ np.abs(x))):
-        return x, np.zeros(bounds.size)
-    soft = np.sqrt(softness)
-    dual = np.concatenate([rows.T, np.diag(soft)])
-    multipliers, _ = nnls(dual, np.concatenate([x, -bounds / soft]))
-    return x - rows.T @ multipliers, multipliers
+
+def _hold(
+    rows: Float[np.ndarray, "k n"],
+    gap: Float[np.ndarray, " k"],
+    softness: Float[np.ndarray, " k"],
+    held: Bool[np.ndarray, " k"],
+    multipliers: Float[np.ndarray, " k"],
+) -> bool:
+    """Move the multipliers of held bounds towards what holds them, until one of them is zero.
+
+    Returns:
+        Whether they came all the way.
+    """
+    N, now = rows[held], multipliers[held]
+    wanted = np.linalg.solve(N @ N.T + np.diag(softness[held]), gap[held])
+    falling = wanted <= 0.0
+    if not np.any(falling):
+        multipliers[held] = wanted
+        return True
+    shares = np.divide(now, now - wanted, out=np.ones_like(now), where=falling & (now > wanted))
+    share = np.min(shares, where=falling, initial=1.0)
+    moved = now + share * (wanted - now)
+    multipliers[held] = np.where(falling & (shares <= share), 0.0, moved)
+    return False
 
 
 def nearest_acceleration(
