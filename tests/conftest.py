@@ -25,12 +25,26 @@ settings.load_profile("opspace")
 
 
 def pytest_configure(config):
-    """Have the tick ready before any test, and in every worker.
-
-    Compiled once for all workers, and linked before a test of one of its parts brings another copy of
-    that part: what runs here is what runs in every other process, to the last bit.
-    """
+    """Have the kernels ready before any test, once for all workers, and keep single ones."""
     del config
-    from opspace.controller.warm_up import compiled_tick
+    from opspace.plan.entries import KERNELS
 
-    compiled_tick()
+    keep_single_kernels()
+    KERNELS.load()
+
+
+def keep_single_kernels():
+    """Have numba keep what tests call of the kernels' parts; users never compile a part alone."""
+    from opspace.machine import jit
+    from opspace.machine.sources import stamp
+
+    compiled, contents = jit.jit, stamp()
+
+    def kept(function):
+        found = compiled(function)
+        found.enable_caching()
+        # By itself numba looks at the file of a function, not at those of the ones that it calls.
+        found._cache._cache_file._source_stamp = contents
+        return found
+
+    jit.jit = kept

@@ -8,7 +8,6 @@ from hypothesis import strategies as st
 import opspace as osc
 from opspace.command import Status
 from opspace.controller import Controller, ReferenceController
-from opspace.kernels.tick import tick
 from opspace.loop import simulate
 from opspace.plan.scales import Singularity
 from opspace.robots import available_robots, load_robot
@@ -385,24 +384,6 @@ def test_no_angle_makes_a_step(robot, max_speed):
             q[0] += 4.0 * np.pi / ticks
         largest.append(np.abs(np.diff(path, axis=0)).max())
     assert largest[1] < 0.15 * largest[0]
-
-
-def test_nothing_is_compiled_once_it_is_warm():
-    robot = load_robot("puma560")
-    controller = Controller(robot, Stack([PositionTask()]))
-    controller.warm_up()
-    compiled = len(tick.signatures)
-    assert controller.warm_up() == 0.0
-    for name, backend in ROBOTS:
-        twins = Twins((name, backend), lambda: [JointLimits(), PositionTask(), OrientationTask()])
-        first, second = list(twins.stacks[0]), list(twins.stacks[1])
-        for stack, tasks in zip(twins.stacks, (first, second), strict=True):
-            stack.swap(tasks[0], tasks[1], 0.005)
-            stack.insert(PostureTask(), 7.0, 0.003)
-        q, v = state(twins.robot)
-        for k in range(10):
-            twins.step(k * DT, q, v)
-    assert len(tick.signatures) == compiled == 1
 
 
 @pytest.mark.parametrize("experiment", ["singularity", "joint-limit"])

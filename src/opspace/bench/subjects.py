@@ -10,7 +10,7 @@ import numpy as np
 
 from opspace.bench.scenes import Scene
 from opspace.controller import ReferenceController
-from opspace.controller.warm_up import compiled_tick
+from opspace.plan.entries import KERNELS
 from opspace.robots.adapter import AdapterBase, held_joints
 from opspace.robots.protocol import Robot
 from opspace.tasks import OrientationTask, PoseTask, PositionTask, PostureTask
@@ -32,7 +32,7 @@ def subjects(scene: Scene, readable: bool = False) -> dict[str, Tick]:
     """
     found: dict[str, Tick] = {}
     controller = scene.controller()
-    compiled_tick()
+    KERNELS.load()
     t = scene.time
     found[LIBRARY] = lambda q, v: controller.step(t, q, v)
     robot = scene.robot()

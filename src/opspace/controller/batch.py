@@ -12,11 +12,11 @@ from numpy.typing import ArrayLike
 
 from opspace.errors import InputError
 from opspace.kernels.columns import OWN, REMEMBERS, TURN
-from opspace.kernels.many_states import ticks
-from opspace.machine.record import Handle
+from opspace.machine.field_table import Record
+from opspace.plan.entries import KERNELS
 from opspace.plan.pack_task import kind_of
 from opspace.plan.plan import Plan
-from opspace.plan.records import REMEMBERED
+from opspace.plan.records import REMEMBERED, STATES
 from opspace.robots.adapter import AdapterBase
 from opspace.robots.bodies import make_dynamics
 from opspace.robots.motion_axes import MotionAxes
@@ -86,14 +86,15 @@ class Batch:
         first = self._plans[0]
         first.go_on_from(before, first.members)
         self._refresh(t)
-        remembered = _remembered(first)
-        tau = np.zeros(Q.shape)
+        given = {"Q": Q, "V": V, "own": own, "before": _remembered(first)}
+        states = STATES.make({}, given)
+        ticks, record = KERNELS["ticks"], states.handle()
         chunks = iter(range(0, len(Q), CHUNK))
 
         def work(plan: Plan) -> None:
             for first in chunks:  # the next one that nobody has taken
                 end = min(first + CHUNK, len(Q))
-                ticks(t, plan.handle, remembered, Q, V, own, first, end, tau)
+                ticks(t, plan.handle.address, record.address, first, end)
 
         used = self._plans[: max(1, -(-len(Q) // CHUNK))]
         if len(used) == 1:
@@ -101,7 +102,7 @@ class Batch:
         else:
             with ThreadPoolExecutor(len(used)) as pool:  # a kept one would not live in a fork
                 list(pool.map(work, used))
-        return tau
+        return states.tau
 
     def gravity(self, Q: np.ndarray, V: np.ndarray) -> np.ndarray:
         """Compute the gravity torque at every state, (states, n) N·m."""
@@ -216,7 +217,7 @@ def check_members(members: tuple[Member, ...]) -> None:
             )
 
 
-def _remembered(plan: Plan) -> Handle:
+def _remembered(plan: Plan) -> Record:
     """Return what a plan knows of the tick before."""
     tick = plan.tick
     found = {
@@ -224,4 +225,4 @@ def _remembered(plan: Plan) -> Handle:
         "remembers": tick.kind[:, REMEMBERS].copy(),
         "turn": tick.numbers[:, TURN : TURN + 4].copy(),
     }
-    return REMEMBERED.make({}, found).handle()
+    return REMEMBERED.make({}, found)

@@ -15,7 +15,6 @@ from opspace.controller.batch import Batch, check_members, checked_states, cores
 from opspace.controller.disturbance import DisturbanceObserver
 from opspace.controller.reference import ReferenceController
 from opspace.controller.stages import sum_of_hard_torques
-from opspace.controller.warm_up import compiled_batch, compiled_tick, tick_entry
 from opspace.controller.watchdog import Watchdog
 from opspace.errors import InputError
 from opspace.kernels.columns import (
@@ -35,7 +34,7 @@ from opspace.kernels.columns import (
     TASK_BIAS,
 )
 from opspace.law import PROFILES
-from opspace.machine.record import Handle
+from opspace.plan.entries import KERNELS
 from opspace.plan.plan import Plan, structure
 from opspace.plan.read_report import CompiledReport
 from opspace.robots.adapter import AdapterBase
@@ -57,10 +56,10 @@ _Fixed: TypeAlias = tuple[
     Watchdog | None,
     Callable[[float], tuple[Member, ...]],
     DisturbanceObserver | None,
-    Callable[[float, Handle], int],
+    Callable[[float, int], int],
 ]
 _LaidOut: TypeAlias = tuple[
-    tuple[Member, ...], Plan, Handle, Callable[[], np.ndarray], Callable[[], bytes]
+    tuple[Member, ...], Plan, int, Callable[[], np.ndarray], Callable[[], bytes]
 ]
 
 
@@ -120,10 +119,10 @@ class Controller(ReferenceController):
                 robot.update(robot.q, robot.v)
                 self._leave(members)
                 return self._answer(t, members, STATUSES[timing])
-        _, plan, handle, torque, memory = laid_out
+        _, plan, address, torque, memory = laid_out
         if plan.moving or CHANGES.last is not plan.seen:
             plan.refresh(robot, t)
-        answer = tick(t, handle) if observer is None else self._learn(t, observer)
+        answer = tick(t, address) if observer is None else self._learn(t, observer)
         if answer < 0:
             if answer == STATE_NOT_FINITE:
                 robot.check_state(robot.q, robot.v)
@@ -147,7 +146,7 @@ class Controller(ReferenceController):
         plan, v = self._plan, self.robot.v
         observer.observe(t, v)
         plan.disturb(observer.acceleration)
-        answer = self._fixed[-1](t, plan.handle)
+        answer = self._fixed[-1](t, plan.handle.address)
         if answer >= 0:
             observer.remember(t, v, plan.tick.joint_acceleration)
         return answer
@@ -219,7 +218,7 @@ class Controller(ReferenceController):
         robot = self.robot
         if self._axes is None or not isinstance(robot, AdapterBase):
             return 0.0
-        seconds = compiled_tick()
+        seconds = KERNELS.load()
         self._fixed = (
             robot,
             robot.place,
@@ -227,7 +226,7 @@ class Controller(ReferenceController):
             self._timing,
             self.stack.begin_tick,
             self._observer,
-            tick_entry(),
+            KERNELS["tick"],
         )
         self.stack.foresee(self._lay_out_ahead)
         return seconds
@@ -266,7 +265,6 @@ class Controller(ReferenceController):
                 f"robot {robot.name!r} is not one of load_robot with hinges and slides; a batch "
                 "needs its bodies"
             )
-        compiled_batch()
         return Batch(robot, self._bodies, members, self._planned, threads)
 
     def _lay_out_ahead(self, to_come: Iterator[tuple[Member, ...]]) -> None:
@@ -295,7 +293,8 @@ class Controller(ReferenceController):
             self._readable = False
         self._plan = plan
         memory = plan.memory
-        laid_out = self._laid_out = members, plan, plan.handle, plan.tick.tau.copy, memory.tobytes
+        address, torque = plan.handle.address, plan.tick.tau.copy
+        laid_out = self._laid_out = members, plan, address, torque, memory.tobytes
         return laid_out
 
     def _leave(self, members: tuple[Member, ...]) -> None:

@@ -76,3 +76,8 @@ OPTION_SIZE = 19
 STATE_NOT_FINITE, NOT_FINITE, NOT_POSITIVE_DEFINITE = -1, -2, -3
 SOLVE = 1 << max(Status).bit_length()
 """What a hard torque counts in its answer, above every combination of `opspace.Status`."""
+
+
+def slot_bit(k: int) -> int:
+    """Bit of slot k in a corner: earlier slots are higher, so that corners sort like the levels."""
+    return 1 << (61 - k)

@@ -17,6 +17,15 @@ from opspace.kernels.columns import (
 )
 from opspace.kernels.compiled_scalars import limit_command, limit_presence
 from opspace.kernels.inertia import acceleration_of, whiten
+from opspace.kernels.limit_columns import (
+    BRAKE,
+    COMMAND,
+    DISTURBANCE,
+    MARGIN,
+    POSITION,
+    SIGN,
+    SPEED,
+)
 from opspace.kernels.projection import nearest_acceleration, task_metric
 from opspace.law.scalars import BROKEN, LOST, UNBOUNDED
 from opspace.machine.jit import jit
@@ -24,9 +33,6 @@ from opspace.machine.jit import jit
 FILTERED = int(Status.FILTERED)
 LIMIT_LOST = int(Status.LIMIT_LOST)
 SCALED = int(Status.TORQUE_SCALED)
-
-# Columns of Tick.limit: side, rad, rad/s², rad/s², rad/s², rad/s, rad/s².
-SIGN, POSITION, BRAKE, MARGIN, COMMAND, SPEED, DISTURBANCE = range(7)
 
 
 @jit

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from functools import partial
 
 import numpy as np
 
@@ -14,26 +13,23 @@ from opspace.machine.jit import jit
 LARGEST = float(np.finfo(float).max)
 
 
-@partial(jit, nogil=True)
-def ticks(t, work, before, Q, V, own, first, end, tau):
+@jit
+def ticks(t, work, states, first, end):
     """Compute the torque at the states ``first`` to ``end`` − 1, each as the tick after ``before``.
 
     Args:
         t: Time, s.
         work: `TICK` of a robot that it computes itself.
-        before: `REMEMBERED`.
-        Q: (states, nq) configurations, rad or m.
-        V: (states, n) velocities, rad/s or m/s.
-        own: (states, tasks) activation of each task by its own function, or one row for all.
+        states: `STATES`; its tau is filled.
         first: First state.
         end: State after the last one.
-        tau: (states, n) filled, N·m.
     """
     n = work.v.shape[0]
+    Q, V, own, tau = states.Q, states.V, states.own, states.tau
     for i in range(first, end):
         for a in range(n):
             work.q[a], work.v[a] = Q[i, a], V[i, a]
-        begin_state(work, before, own[i if own.shape[0] > 1 else 0])
+        begin_state(work, states.before, own[i if own.shape[0] > 1 else 0])
         if tick(t, work) < 0:
             brake(work, tau[i])
         else:

@@ -2,10 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
-
-import numpy as np
-
 from opspace.kernels.algebra import singular_values
 from opspace.kernels.columns import (
     RELEASE_UPPER,
@@ -18,34 +14,35 @@ from opspace.kernels.compiled_scalars import profile
 from opspace.machine.jit import jit
 
 
-@partial(jit, counted=True)
-def spectrum(B, option):
-    """Directions of a level, strongest first: σ, activation, response, vectors as columns (Eq. 25)."""
+@jit
+def spectrum(level):
+    """Directions of a level, strongest first: σ, activation, response, vectors as columns (Eq. 25).
+
+    Args:
+        level: `opspace.plan.records.SPECTRUM`; reads B and option.
+    """
+    B, C, Y, sigma, option = level.B, level.C, level.Y, level.sigma, level.option
     m, free = B.shape
     k = min(m, free)
     wide = m <= free
     # The smaller side is decomposed; the vectors of the rows come out on either.
-    C = np.zeros((k, max(m, free)))
     for i in range(m):
         for b in range(free):
             if wide:
                 C[i, b] = B[i, b]
             else:
                 C[b, i] = B[i, b]
-    Y = np.zeros((k, k))
-    sigma = np.zeros(k)
     singular_values(C, k, C.shape[1], Y, sigma)
-    directions = np.zeros((m, k))
-    activation, response = np.ones(k), np.ones(k)
     for i in range(k):
         for a in range(m):
             if wide:
-                directions[a, i] = Y[i, a]
+                level.directions[a, i] = Y[i, a]
             elif sigma[i] > 0.0:
-                directions[a, i] = C[i, a] / sigma[i]
+                level.directions[a, i] = C[i, a] / sigma[i]
         sigma[i] *= sigma[i]
         if option[SINGULAR] != 0.0:
             above, code = sigma[i] - option[SIGMA_LOWER], int(option[SIGMA_PROFILE])
-            response[i] = profile(code, above / (option[SIGMA_UPPER] - option[SIGMA_LOWER]))
-            activation[i] = profile(code, above / (option[RELEASE_UPPER] - option[SIGMA_LOWER]))
-    return sigma, activation, response, directions
+            level.response[i] = profile(code, above / (option[SIGMA_UPPER] - option[SIGMA_LOWER]))
+            level.activation[i] = profile(
+                code, above / (option[RELEASE_UPPER] - option[SIGMA_LOWER])
+            )

@@ -40,7 +40,8 @@ from opspace.kernels.inertia import (
     whitened_of,
 )
 from opspace.kernels.level import project, solve_level, take_alternative
-from opspace.kernels.limit_rows import COMMAND, SIGN, begin_limits, insert_limits, keep_bounds
+from opspace.kernels.limit_columns import COMMAND, SIGN
+from opspace.kernels.limit_rows import begin_limits, insert_limits, keep_bounds
 from opspace.kernels.task_rows import evaluate_tasks
 from opspace.kernels.walk import begin, keep_inside, pass_on, slot_bit, walk
 from opspace.law.scalars import CHAINED, EXACT, NO_GROUP

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from opspace.kernels import columns
 from opspace.kernels.compiled_scalars import room_for
 from opspace.kernels.inertia import torque_of
 from opspace.kernels.level import project, solve_level, take_alternative
@@ -81,10 +82,7 @@ def walk(first, levels, n, slots, J, f, masks, weights, corners, rest, buffer, s
             d -= 1
 
 
-@jit
-def slot_bit(k):
-    """Bit of slot k in a corner: earlier slots are higher, so that corners sort like the levels."""
-    return 1 << (61 - k)
+slot_bit = jit(columns.slot_bit)
 
 
 @jit

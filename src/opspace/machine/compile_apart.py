@@ -1,4 +1,4 @@
-"""Compile in a process of its own, so that this one runs what every later start runs."""
+"""Compile in a process of its own: this one needs no compiler, and keeps its memory free of it."""
 
 from __future__ import annotations
 
@@ -6,47 +6,47 @@ import logging
 import os
 import subprocess
 import sys
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
-from numba.core import config
+from opspace.machine.processor import Processor
 
 log = logging.getLogger("opspace")
 
-NESTED = "OPSPACE_COMPILES_APART"
-"""Set in the environment of the process that compiles, which starts no other one."""
+PROGRAM = """
+import os, sys
+answer = os.dup(1)
+os.dup2(2, 1)  # whatever is printed on the way is no part of the object
+sys.path[:] = {path!r}
+from opspace.machine.translate import translate_only
+translate_only()
+from {module} import ENTRIES
+from opspace.machine.compile_object import compile_object
+from opspace.machine.processor import Processor
+with os.fdopen(answer, "wb") as answer:
+    answer.write(compile_object(ENTRIES, Processor{processor!r}))
+"""
 
-Calls = Callable[[], list[tuple[Any, tuple[Any, ...]]]]
-"""Gives compiled functions, each with arguments of the types that it is compiled for."""
 
-
-def compile_apart(calls: Calls) -> None:
-    """Have another process compile functions and keep them on the disk; wait for it.
-
-    A process that compiles links a function to copies of its parts that were optimised apart from
-    it, one that reads from the disk to those compiled into it. Sums are taken in another order in
-    the two, and results differ in their last bits: a run could not be repeated exactly by the next
-    start. Where no other process can be started, nothing happens; the caller compiles by itself.
+def compile_apart(module: str, processor: Processor) -> bytes | None:
+    """Have another process compile, and wait for it.
 
     Args:
-        calls: A function that can be imported by its name.
+        module: Module with the ``ENTRIES``.
+        processor: What for.
+
+    Returns:
+        The object, None where no other process can be started.
     """
-    # An application with Python inside would be started a second time, and again by that one.
+    # An application with Python inside would be started a second time.
     own = Path(sys.executable or "").stem.lower().startswith("python")
-    if not own or getattr(sys, "frozen", False) or NESTED in os.environ:
-        return
-    environment = {**os.environ, NESTED: "1"}
-    if directory := getattr(config, "CACHE_DIR", ""):  # it may have been set in this process
-        environment["NUMBA_CACHE_DIR"] = directory
-    program = (
-        f"import sys; sys.path[:] = {[entry for entry in sys.path if type(entry) is str]!r}\n"
-        f"from {calls.__module__} import {calls.__name__} as calls\n"
-        "for compiled, arguments in calls():\n"
-        "    compiled(*arguments)\n"
-    )
+    if not own or getattr(sys, "frozen", False):
+        return None
+    path = [entry for entry in sys.path if type(entry) is str]
+    program = PROGRAM.format(path=path, module=module, processor=tuple(processor))
+    # How a user has numba treat functions of the user's own is nothing to kernels.
+    environment = {k: x for k, x in os.environ.items() if not k.startswith("NUMBA_")}
     try:
-        subprocess.run(
+        done = subprocess.run(
             [sys.executable, "-c", program],
             env=environment,
             stdin=subprocess.DEVNULL,
@@ -57,3 +57,6 @@ def compile_apart(calls: Calls) -> None:
         log.debug("no process could be started to compile: %s", error)
     except subprocess.CalledProcessError as error:
         log.debug("compiling in another process failed:\n%s", error.stderr.decode(errors="replace"))
+    else:
+        return done.stdout
+    return None

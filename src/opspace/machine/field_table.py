@@ -182,6 +182,15 @@ class RecordTable:
         return sum(math.prod(known[field.shape]) for field in self._reported)
 
     @cached_property
+    def layout(self) -> str:
+        """What compiled code takes for granted: the fields in order, their types and dimensions."""
+        fields = (
+            f"{f.name}: {f.of.layout if f.of else f'{np.dtype(f.dtype)}{len(f.shape)}'}"
+            for f in self.fields
+        )
+        return f"{self.name}({', '.join(fields)})"
+
+    @cached_property
     def _by_name(self) -> dict[str, Field]:
         return {field.name: field for field in self.fields}
 

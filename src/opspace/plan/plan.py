@@ -17,7 +17,7 @@ from opspace.kernels.columns import (
     LIMIT_PROFILE,
     LIMIT_WEIGHT,
 )
-from opspace.kernels.limit_rows import DISTURBANCE, SIGN, SPEED
+from opspace.kernels.limit_columns import DISTURBANCE, SIGN, SPEED
 from opspace.law import PROFILES
 from opspace.law.scalars import NO_GROUP
 from opspace.machine.field_table import Record

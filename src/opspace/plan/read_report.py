@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from opspace.command import Found, LevelStatus, TaskStatus
-from opspace.kernels.spectrum import spectrum
-from opspace.kernels.walk import slot_bit
+from opspace.kernels.columns import slot_bit
+from opspace.plan.entries import KERNELS
 from opspace.plan.memory import Reported
+from opspace.plan.records import SPECTRUM
 
 if TYPE_CHECKING:
     from opspace.plan.plan import Plan
@@ -113,10 +114,14 @@ class CompiledReport:
             empty = np.zeros(0)
             names = tuple(member.task.name for member in members)
             return LevelStatus(level, names, empty, empty, empty, np.zeros((rows, 0)), scale)
-        present = [s for s in here if int(chosen) & slot_bit.py_func(s)]
+        present = [s for s in here if int(chosen) & slot_bit(s)]
         packed = [plan.packed[plan.places[s][1]] for s in present]
         first, rows = int(plan.first_kept[depth]), sum(p.task.rows for p in packed)
-        B = kept[first : first + rows, : int(width)]
-        sigma, activation, response, directions = spectrum(np.array(B), plan.tick.option)
+        B = np.array(kept[first : first + rows, : int(width)])
+        sizes = {"fewer": min(B.shape), "more": max(B.shape)}
+        found = SPECTRUM.make(sizes, {"B": B, "option": plan.tick.option})
+        KERNELS["spectrum"](found.handle().address)
         names = tuple(p.task.name for p in packed)
-        return LevelStatus(level, names, sigma, activation, response, directions, scale)
+        return LevelStatus(
+            level, names, found.sigma, found.activation, found.response, found.directions, scale
+        )

@@ -30,6 +30,12 @@ SIZES = {
     "limits": "joint limits, sides counted",
     "corners": "corners that the blend can have",
     "widest": "the larger of rows + limits and n, at least one",
+    "states": "states of a batch",
+    "given": "states that own activations are given for: one that stands for all, or all",
+    "here": "rows of one level",
+    "free": "motions that the levels above it leave free",
+    "fewer": "the smaller of these two",
+    "more": "the larger",
 }
 """What the names in shapes stand for."""
 
@@ -210,4 +216,27 @@ REMEMBERED = RecordTable(
     _caller("turn", ("tasks", 4), "last rotation of the task, quaternion wxyz"),
 )
 
-TABLES = (TICK, SPACE, INERTIA, BOUNDS, RIGID_BODIES, DYNAMICS, REMEMBERED)
+STATES = RecordTable(
+    "States",
+    "Many states of a robot, each the tick after the same one before.",
+    _caller("Q", ("states", "nq"), "configurations; quaternions wxyz", "rad, m"),
+    _caller("V", ("states", "n"), "velocities", "rad/s, m/s"),
+    _caller("own", ("given", "tasks"), "activation of each task by its own function"),
+    _work("tau", ("states", "n"), "the torques", "N·m"),
+    _record("before", of=REMEMBERED),
+)
+
+SPECTRUM = RecordTable(
+    "Spectrum",
+    "The directions of one level, strongest first, as a report gives them.",
+    _caller("B", ("here", "free"), "its rows in the basis of the free motions"),
+    _caller("option", (OPTION_SIZE,), "options of the controller"),
+    _work("C", ("fewer", "more"), "B, or its transpose where that has fewer rows"),
+    _work("Y", ("fewer", "fewer"), "vectors of the smaller side, as rows"),
+    _work("sigma", ("fewer",), "σ"),
+    _work("activation", ("fewer",), "how much of each direction is used", start=1.0),
+    _work("response", ("fewer",), "how much of the force each gives", start=1.0),
+    _work("directions", ("here", "fewer"), "directions of the rows, as columns"),
+)
+
+TABLES = (TICK, SPACE, INERTIA, BOUNDS, RIGID_BODIES, DYNAMICS, STATES, REMEMBERED, SPECTRUM)

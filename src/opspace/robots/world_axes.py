@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from opspace.machine.kept_code import compile_and_keep
+import numpy as np
 
 
-@compile_and_keep
-def world_axes(cdof, origins, com, axes):
+def world_axes(cdof: np.ndarray, origins: np.ndarray, com: np.ndarray, axes: np.ndarray) -> None:
     """Bring motion axes about the centre of mass of each tree to the world's origin.
 
     Args:
@@ -15,20 +14,16 @@ def world_axes(cdof, origins, com, axes):
         com: (bodies, 3) centres of mass of the subtrees, m.
         axes: (n, 6) filled, linear then angular.
     """
-    for j in range(axes.shape[0]):
-        x, y, z = com[origins[j]]
-        a, b, c = cdof[j, 0], cdof[j, 1], cdof[j, 2]
-        axes[j, 0] = cdof[j, 3] + y * c - z * b
-        axes[j, 1] = cdof[j, 4] + z * a - x * c
-        axes[j, 2] = cdof[j, 5] + x * b - y * a
-        axes[j, 3], axes[j, 4], axes[j, 5] = a, b, c
+    x, y, z = com.take(origins, axis=0).T
+    a, b, c = cdof[:, 0], cdof[:, 1], cdof[:, 2]
+    axes[:, 0] = cdof[:, 3] + y * c - z * b
+    axes[:, 1] = cdof[:, 4] + z * a - x * c
+    axes[:, 2] = cdof[:, 5] + x * b - y * a
+    axes[:, 3:] = cdof[:, :3]
 
 
-@compile_and_keep
-def placements(first, xmat, xpos, placement):
+def placements(first: int, xmat: np.ndarray, xpos: np.ndarray, placement: np.ndarray) -> None:
     """Write rotations (by columns) and positions into the rows from ``first`` on."""
-    for i in range(xpos.shape[0]):
-        for column in range(3):
-            for row in range(3):
-                placement[first + i, 3 * column + row] = xmat[i, 3 * row + column]
-            placement[first + i, 9 + column] = xpos[i, column]
+    rows = placement[first : first + len(xpos)]
+    rows[:, :9].reshape(-1, 3, 3)[:] = xmat.reshape(-1, 3, 3).transpose(0, 2, 1)
+    rows[:, 9:] = xpos

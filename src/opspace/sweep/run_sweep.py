@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from opspace.controller.warm_up import compiled_tick
 from opspace.errors import InputError
+from opspace.plan.entries import KERNELS
 from opspace.scenario.load import dump_scenario, scenario_from
 from opspace.sweep.cluster import run_on_ray
 from opspace.sweep.limit_measures import UNITS
@@ -127,7 +127,7 @@ def _rows(
     if ray is not None:
         return run_on_ray(plan, left, ray, timeout)
     # Once here rather than once in every process, at the same time.
-    compiled_tick()
+    KERNELS.load()
     return run_here(plan, left, jobs, timeout)
 
 

@@ -12,7 +12,7 @@ from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
 from typing import Any
 
-from opspace.controller.warm_up import compiled_tick
+from opspace.plan.entries import KERNELS
 from opspace.sweep.row import empty_row, run_row
 from opspace.sweep.sweep_plan import SweepPlan
 
@@ -121,7 +121,7 @@ def _serve(plan: SweepPlan, pipe: Connection) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     for name in THREADS:
         os.environ[name] = "1"
-    compiled_tick()
+    KERNELS.load()
     pipe.send(None)
     while True:
         try:

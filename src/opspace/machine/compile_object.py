@@ -1,0 +1,123 @@
+"""Compile kernels into one object with a C interface, optimised once as a whole."""
+
+# numba's own modules have no type stubs.
+# pyright: reportUnknownMemberType=false
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any
+
+from llvmlite import binding as llvm
+from llvmlite import ir
+from numba import types
+from numba.core import config as settings
+from numba.core.compiler_lock import global_compiler_lock
+
+from opspace.machine.field_table import RecordTable
+from opspace.machine.handle_type import handle_type
+from opspace.machine.kernel_entry import Argument, KernelEntry
+from opspace.machine.processor import Processor
+
+LIBRARY = {
+    *("acos", "asin", "atan", "atan2", "cos", "cosh", "exp", "fmod", "log", "pow", "sin"),
+    *("sincos", "sqrt", "tan", "tanh", "memcpy", "memmove", "memset"),
+}
+"""What the object may ask of the process that loads it: C's own library, nothing of Python's."""
+
+NUMBERS = {float: types.float64, int: types.int64}
+
+
+def compile_object(entries: Sequence[KernelEntry], processor: Processor) -> bytes:
+    """Compile entries and everything that they call.
+
+    Numba only translates. LLVM optimises once, when all is in one piece: done function by function,
+    as numba does by itself, every caller optimises and emits its callees again, which takes three
+    times as long and gives slower code.
+
+    Args:
+        entries: The functions.
+        processor: What for.
+
+    Returns:
+        The object file.
+
+    Raises:
+        ImportError: A kernel asks for something that is neither here nor in C's library.
+    """
+    with _translated_only(), global_compiler_lock:
+        text = _translation(entries)
+    module = llvm.parse_assembly(text)
+    machine = processor.machine()
+    module.triple, module.data_layout = processor.triple, str(machine.target_data)
+    seen = {entry.symbol for entry in entries}
+    for part in (*module.functions, *module.global_variables):
+        if not part.is_declaration and part.name not in seen:
+            part.linkage = "internal"
+    _optimise(module, machine)
+    asked = {f.name for f in module.functions if f.is_declaration}
+    if foreign := {name for name in asked if not name.startswith("llvm.")} - LIBRARY:
+        raise ImportError(f"compiled kernels ask for {', '.join(sorted(foreign))}")
+    return machine.emit_object(module)
+
+
+@contextmanager
+def _translated_only() -> Iterator[None]:
+    """Have numba optimise nothing."""
+    config: Any = settings
+    before = config.OPT
+    config.OPT = type(before)(0)
+    try:
+        yield
+    finally:
+        config.OPT = before
+
+
+def _translation(entries: Sequence[KernelEntry]) -> str:
+    """Return LLVM's form of the entries and of everything that they call, as text."""
+    kernels: list[Any] = [getattr(importlib.import_module(e.module), e.name) for e in entries]
+    context = kernels[0].targetctx
+    library = context.codegen().create_library("opspace")
+    module = library.create_ir_module("opspace")
+    for entry, kernel in zip(entries, kernels, strict=True):
+        signature = tuple(map(_type_of, entry.takes))
+        kernel.compile(signature)
+        compiled = kernel.overloads[signature]
+        library.add_linking_library(compiled.library)
+        _define(entry, compiled.fndesc, context, module)
+    library.add_ir_module(module)
+    library.finalize()
+    return library.get_llvm_str()
+
+
+def _type_of(argument: Argument) -> Any:
+    return handle_type(argument) if isinstance(argument, RecordTable) else NUMBERS[argument]
+
+
+def _define(entry: KernelEntry, found: Any, context: Any, module: Any) -> None:
+    """Add the C function; the code for an exception is dropped, since kernels raise none."""
+    given = [context.get_value_type(kind) for kind in found.argtypes]
+    back = ir.VoidType() if entry.gives is None else context.get_value_type(found.restype)
+    function = ir.Function(module, ir.FunctionType(back, given), entry.symbol)
+    builder = ir.IRBuilder(function.append_basic_block())
+    kernel = context.declare_function(module, found)
+    _, result = context.call_conv.call_function(
+        builder, kernel, found.restype, found.argtypes, function.args
+    )
+    if entry.gives is None:
+        builder.ret_void()
+    else:
+        builder.ret(result)
+
+
+def _optimise(module: Any, machine: Any) -> None:
+    options = llvm.create_pipeline_tuning_options(speed_level=2)
+    options.loop_vectorization = True
+    options.slp_vectorization = False
+    builder = llvm.create_pass_builder(machine, options)
+    passes = builder.getModulePassManager()
+    # Names of what nobody can call are numbered by chance; two objects would differ in them.
+    passes.add_strip_symbols_pass()
+    passes.run(module, builder)

@@ -1,0 +1,50 @@
+"""What compiled functions Python calls, and with what."""
+
+from __future__ import annotations
+
+import ctypes
+from typing import Any, NamedTuple, TypeAlias
+
+from opspace.machine.field_table import RecordTable
+
+Argument: TypeAlias = type[float] | type[int] | RecordTable
+
+_C = {float: ctypes.c_double, int: ctypes.c_int64, None: None}
+
+
+class KernelEntry(NamedTuple):
+    """A compiled function that Python calls, with a C interface.
+
+    A number is passed as it is, a record by the address of its handle.
+
+    Attributes:
+        module: Module of the kernel.
+        name: Its name there.
+        takes: Its arguments: float, int, or the table of a record.
+        gives: What it returns: int, or nothing.
+        releases: Whether other threads of Python may run while it does.
+    """
+
+    module: str
+    name: str
+    takes: tuple[Argument, ...]
+    gives: type[int] | None = None
+    releases: bool = False
+
+    @property
+    def symbol(self) -> str:
+        """Name of the C function."""
+        return f"opspace_{self.name}"
+
+    @property
+    def prototype(self) -> Any:
+        """Type of the C function; keeping the interpreter is quicker than giving it away."""
+        make = ctypes.CFUNCTYPE if self.releases else ctypes.PYFUNCTYPE
+        given = (ctypes.c_void_p if isinstance(one, RecordTable) else _C[one] for one in self.takes)
+        return make(_C[self.gives], *given)
+
+    @property
+    def layout(self) -> str:
+        """Everything that the compiled function takes for granted of its arguments."""
+        taken = (one.layout if isinstance(one, RecordTable) else one.__name__ for one in self.takes)
+        return f"{self.module}.{self.name}({', '.join(taken)})"

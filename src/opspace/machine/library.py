@@ -1,0 +1,96 @@
+"""Compiled functions that Python calls: found on the disk or compiled once, then loaded."""
+
+from __future__ import annotations
+
+import logging
+import threading
+import time
+from collections.abc import Sequence
+from typing import Any
+
+from llvmlite import binding as llvm
+
+from opspace.machine.compile_apart import compile_apart
+from opspace.machine.kept_object import keep, read, writable
+from opspace.machine.kernel_entry import KernelEntry
+from opspace.machine.processor import Processor, host
+from opspace.machine.sources import stamp
+
+log = logging.getLogger("opspace")
+
+ESTIMATE = "about half a minute, on a busy machine several"
+"""How long it takes, measured on a shared core: 30 s."""
+
+
+class Library:
+    """Compiled functions in one object, which every process loads as it is.
+
+    Args:
+        module: Module that has them as ``ENTRIES``.
+        entries: The functions.
+    """
+
+    def __init__(self, module: str, entries: Sequence[KernelEntry]) -> None:
+        self._module = module
+        self._entries = tuple(entries)
+        self._functions: dict[str, Any] = {}
+        self._engine: Any = None  # its memory holds the code
+        self._lock = threading.Lock()
+
+    def __getitem__(self, name: str) -> Any:
+        """Return a function, to be called with numbers and the addresses of handles."""
+        if not self._functions:
+            self.load()
+        return self._functions[name]
+
+    def load(self) -> float:
+        """Load the functions, compiled before or now; immediate when that has happened already.
+
+        Returns:
+            How long it took, s.
+        """
+        if self._functions:
+            return 0.0
+        start = time.perf_counter()
+        with self._lock:
+            if not self._functions:
+                processor = host()
+                self._functions = self._linked(self._found(processor), processor)
+        return time.perf_counter() - start
+
+    def _found(self, processor: Processor) -> bytes:
+        layout = "\n".join(entry.layout for entry in self._entries)
+        name = f"kernels-{processor.name}-{stamp(layout)[:32]}.o"
+        return read(name) or self._compiled(name, processor)
+
+    def _compiled(self, name: str, processor: Processor) -> bytes:
+        """Compile, keep that and say so; what somebody else has kept in the meantime goes first."""
+        start = time.perf_counter()
+        if writable():
+            log.warning("compiling the control tick, once after each installation: %s", ESTIMATE)
+        else:
+            log.warning(
+                "compiling the control tick, as every start will: no directory for it can be "
+                "written, and NUMBA_CACHE_DIR may name one; %s",
+                ESTIMATE,
+            )
+        made = compile_apart(self._module, processor)
+        if made is None:
+            from opspace.machine.compile_object import compile_object  # noqa: PLC0415 - only now
+
+            made = compile_object(self._entries, processor)
+        found = read(name)
+        after = "; it is kept for the next start" if found or keep(name, made) else ""
+        log.warning("compiled the control tick in %.0f s%s", time.perf_counter() - start, after)
+        return found or made
+
+    def _linked(self, content: bytes, processor: Processor) -> dict[str, Any]:
+        engine = self._engine = llvm.create_mcjit_compiler(
+            llvm.parse_assembly(""), processor.machine()
+        )
+        engine.add_object_file(llvm.ObjectFileRef.from_data(content))
+        engine.finalize_object()
+        return {
+            entry.name: entry.prototype(engine.get_function_address(entry.symbol))
+            for entry in self._entries
+        }

@@ -1,0 +1,17 @@
+"""The kernels that Python calls; any other is called by these."""
+
+from __future__ import annotations
+
+from opspace.machine.kernel_entry import KernelEntry
+from opspace.machine.library import Library
+from opspace.plan.records import SPECTRUM, STATES, TICK
+
+ENTRIES = (
+    KernelEntry("opspace.kernels.tick", "tick", (float, TICK), gives=int),
+    KernelEntry(
+        "opspace.kernels.many_states", "ticks", (float, TICK, STATES, int, int), releases=True
+    ),
+    KernelEntry("opspace.kernels.spectrum", "spectrum", (SPECTRUM,)),
+)
+
+KERNELS = Library(__name__, ENTRIES)
