@@ -264,3 +264,34 @@ def test_no_kernel_raises():
     """Nobody would hear of it: the C functions have no place for an error."""
     for path in (Path(__file__).parents[2] / "src" / "opspace" / "kernels").glob("*.py"):
         assert "raise " not in path.read_text("utf-8"), path
+
+
+TRAPPED = """
+from llvmlite import ir
+from numba.cpython import slicing
+from opspace.machine import kept_object
+from opspace.machine.processor import host
+from opspace.machine.translate import translate_only
+
+def trapped(builder, index, size):
+    with builder.if_then(builder.icmp_signed("<", index, index.type(0)), likely=False):
+        kind = ir.FunctionType(ir.VoidType(), ())
+        builder.call(builder.module.declare_intrinsic("llvm.trap", (), kind), ())
+    return index
+
+translate_only()
+slicing.fix_index = trapped
+from opspace.machine.compile_object import compile_object
+from opspace.plan.entries import ENTRIES, KERNELS
+assert kept_object.keep(KERNELS.file_name(host()), compile_object(ENTRIES, host()))
+"""
+
+
+@pytest.mark.slow
+def test_no_index_counts_from_the_end(empty):
+    """What is compiled for users takes that for granted; here, a trap ends the process."""
+    empty("-c", TRAPPED)
+    tests = Path(__file__).parents[1]
+    chosen = [tests / "controller" / f"test_{name}.py" for name in ("compiled", "batch", "bounds")]
+    done = empty("-m", "pytest", "-q", "-x", "-p", "no:cacheprovider", *map(str, chosen))
+    assert "compiling" not in done.stdout + done.stderr

@@ -68,7 +68,7 @@ class Controller(ReferenceController):
 
     Every tick is one call of compiled code, which computes what `ReferenceController` computes; the
     arguments, errors and results are the same. The first controller on a machine compiles it, which
-    takes one to three minutes; later ones read it from the disk.
+    takes about half a minute; later ones read it from the disk.
 
     Options are fixed when it is built. Robots with joints of several coordinates, and stacks of more
     than some thirty tasks, take the readable form.
@@ -164,8 +164,7 @@ class Controller(ReferenceController):
         Row k is what `step` would answer as the next tick, at time ``t``, in the state
         (Q[k], V[k]), if no request began or ended with it: activations, targets and gains are
         those of the moment. The call changes nothing: neither the controller nor its robot nor
-        its tasks. It computes the dynamics itself and uses every core; the first call on a machine
-        compiles for some seconds more.
+        its tasks. It computes the dynamics itself and uses every core.
 
         Activations of the user's own (`Task.activation`) are called in Python, once per state;
         references in time once per call. Call it from the thread that ticks.

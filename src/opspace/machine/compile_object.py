@@ -53,9 +53,11 @@ def compile_object(entries: Sequence[KernelEntry], processor: Processor) -> byte
     machine = processor.machine()
     module.triple, module.data_layout = processor.triple, str(machine.target_data)
     seen = {entry.symbol for entry in entries}
-    for part in (*module.functions, *module.global_variables):
+    parts = [*module.functions, *module.global_variables]
+    for number, part in enumerate(parts):
         if not part.is_declaration and part.name not in seen:
             part.linkage = "internal"
+            part.name = f"part{number}"  # numba's names hold numbers that another run has not
     _optimise(module, machine)
     asked = {f.name for f in module.functions if f.is_declaration}
     if foreign := {name for name in asked if not name.startswith("llvm.")} - LIBRARY:
@@ -118,6 +120,4 @@ def _optimise(module: Any, machine: Any) -> None:
     options.slp_vectorization = False
     builder = llvm.create_pass_builder(machine, options)
     passes = builder.getModulePassManager()
-    # Names of what nobody can call are numbered by chance; two objects would differ in them.
-    passes.add_strip_symbols_pass()
     passes.run(module, builder)

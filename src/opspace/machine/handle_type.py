@@ -96,7 +96,10 @@ def _field(context: Any, builder: Any, kind: HandleType, value: Any, name: str) 
     first, field = kind.start[name], kind.fields[name]
 
     def word(i: int) -> Any:
-        return builder.load(builder.gep(words, [ir.Constant(cgutils.intp_t, first + i)]))
+        found = builder.load(builder.gep(words, [ir.Constant(cgutils.intp_t, first + i)]))
+        # A handle is not written while compiled code runs: what was read once need not be read again.
+        found.set_metadata("invariant.load", builder.module.add_metadata([]))
+        return found
 
     if isinstance(field, HandleType):
         return builder.inttoptr(word(0), cgutils.voidptr_t)

@@ -9,7 +9,7 @@ from opspace.machine.field_table import RecordTable
 
 Argument: TypeAlias = type[float] | type[int] | RecordTable
 
-_C = {float: ctypes.c_double, int: ctypes.c_int64, None: None}
+_C: dict[Any, Any] = {float: ctypes.c_double, int: ctypes.c_int64, None: None}
 
 
 class KernelEntry(NamedTuple):
@@ -36,12 +36,10 @@ class KernelEntry(NamedTuple):
         """Name of the C function."""
         return f"opspace_{self.name}"
 
-    @property
-    def prototype(self) -> Any:
-        """Type of the C function; keeping the interpreter is quicker than giving it away."""
-        make = ctypes.CFUNCTYPE if self.releases else ctypes.PYFUNCTYPE
-        given = (ctypes.c_void_p if isinstance(one, RecordTable) else _C[one] for one in self.takes)
-        return make(_C[self.gives], *given)
+    def free_call(self, address: int) -> Any:
+        """Return the C function at an address, called without the interpreter's lock."""
+        given = (_C.get(one, ctypes.c_void_p) for one in self.takes)
+        return ctypes.CFUNCTYPE(_C[self.gives], *given)(address)
 
     @property
     def layout(self) -> str:

@@ -14,6 +14,7 @@ from opspace.machine.compile_apart import compile_apart
 from opspace.machine.kept_object import keep, read, writable
 from opspace.machine.kernel_entry import KernelEntry
 from opspace.machine.processor import Processor, host
+from opspace.machine.python_call import PythonCalls
 from opspace.machine.sources import stamp
 
 log = logging.getLogger("opspace")
@@ -35,6 +36,7 @@ class Library:
         self._entries = tuple(entries)
         self._functions: dict[str, Any] = {}
         self._engine: Any = None  # its memory holds the code
+        self._calls: PythonCalls | None = None
         self._lock = threading.Lock()
 
     def __getitem__(self, name: str) -> Any:
@@ -58,9 +60,13 @@ class Library:
                 self._functions = self._linked(self._found(processor), processor)
         return time.perf_counter() - start
 
-    def _found(self, processor: Processor) -> bytes:
+    def file_name(self, processor: Processor) -> str:
+        """Return the name under which the object is kept; another one is made of something else."""
         layout = "\n".join(entry.layout for entry in self._entries)
-        name = f"kernels-{processor.name}-{stamp(layout)[:32]}.o"
+        return f"kernels-{processor.name}-{stamp(layout)[:32]}.o"
+
+    def _found(self, processor: Processor) -> bytes:
+        name = self.file_name(processor)
         return read(name) or self._compiled(name, processor)
 
     def _compiled(self, name: str, processor: Processor) -> bytes:
@@ -90,7 +96,11 @@ class Library:
         )
         engine.add_object_file(llvm.ObjectFileRef.from_data(content))
         engine.finalize_object()
-        return {
-            entry.name: entry.prototype(engine.get_function_address(entry.symbol))
+        found = {entry: engine.get_function_address(entry.symbol) for entry in self._entries}
+        freely = {
+            entry.name: entry.free_call(found.pop(entry))
             for entry in self._entries
+            if entry.releases
         }
+        self._calls = PythonCalls(found, processor)
+        return freely | self._calls.functions

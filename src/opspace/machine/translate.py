@@ -11,6 +11,7 @@ from llvmlite import binding as llvm
 from numba.core import cgutils
 from numba.core.codegen import CodeLibrary
 from numba.core.registry import cpu_target
+from numba.cpython import slicing
 
 
 class Translation(CodeLibrary):
@@ -65,7 +66,13 @@ def translate_only() -> None:
     context.codegen()._library_class = Translation
     context.create_cpython_wrapper = context.create_cfunc_wrapper = _nothing
     context.get_executable = lambda *args: [].append  # a key of its own for each function
+    slicing.fix_index = _as_it_is
 
 
 def _nothing(*args: Any, **options: Any) -> None:
     pass
+
+
+def _as_it_is(builder: Any, index: Any, size: Any) -> Any:
+    """Kernels never count from the end: a negative index would be an error, not the last element."""
+    return index

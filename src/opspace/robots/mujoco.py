@@ -15,7 +15,7 @@ from opspace.robots.mujoco_names import frames
 from opspace.robots.passive_forces import carries_weight
 from opspace.robots.pinocchio_model import carried_from_mujoco, frame_ids, model_from_mujoco
 from opspace.robots.rigid_model import RigidModel, rigid_model
-from opspace.robots.world_axes import placements, world_axes
+from opspace.robots.world_axes import WorldAxes
 
 
 class MujocoRobot(AdapterBase):
@@ -44,19 +44,7 @@ class MujocoRobot(AdapterBase):
         self._M_view, self._bias_view = self._M.view(), self._bias.view()
         self._M_view.setflags(write=False)
         self._bias_view.setflags(write=False)
-        self._axes = np.zeros((self.nv, 6))
-        self._placement = np.zeros((model.nbody + model.nsite, 12))
-        self._origins = np.array(model.body_rootid[model.dof_bodyid], dtype=np.int64)
-        data = self._data
-        # Held once: an attribute of the data costs as much as some of the mathematics.
-        self._views = (
-            data.cdof,
-            data.subtree_com,
-            data.xmat,
-            data.xpos,
-            data.site_xmat,
-            data.site_xpos,
-        )
+        self._world = WorldAxes(model, self._data)
         self.update(self.q_reference, np.zeros(self.nv))
 
     @property
@@ -92,8 +80,8 @@ class MujocoRobot(AdapterBase):
             v=self._v,
             M=self._M,
             bias=self._bias,
-            axes=self._axes,
-            placement=self._placement,
+            axes=self._world.axes,
+            placement=self._world.placement,
             parent=np.array(model.dof_parentid, dtype=np.int64),
             frames=frames,
             masses=tuple(
@@ -146,13 +134,7 @@ class MujocoRobot(AdapterBase):
             self._bias -= self._weight_carried()
         if self.description.springs is not None:
             self.description.springs.add_to(self._bias, self._q)
-        self._fill_axes()
-
-    def _fill_axes(self) -> None:
-        cdof, com, xmat, xpos, site_xmat, site_xpos = self._views
-        world_axes(cdof, self._origins, com, self._axes)
-        placements(0, xmat, xpos, self._placement)
-        placements(self._model.nbody, site_xmat, site_xpos, self._placement)
+        self._world.fill()
 
     def _gravity(self, _: int) -> np.ndarray:
         # g(q) = -sum_i m_i J_i^T g, which is the whole mass at the centre of mass.

@@ -2,28 +2,59 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 
-def world_axes(cdof: np.ndarray, origins: np.ndarray, com: np.ndarray, axes: np.ndarray) -> None:
-    """Bring motion axes about the centre of mass of each tree to the world's origin.
+class WorldAxes:
+    """Motion axes about the world's origin, and placements with rotations by columns.
+
+    All views are held: making one costs as much as the mathematics.
+
+    Attributes:
+        axes: (n, 6) motion that a unit of each velocity gives to a body, linear then angular.
+        placement: (bodies + sites, 12) rotations by columns, then positions, m.
 
     Args:
-        cdof: (n, 6) MuJoCo's axes, angular then linear.
-        origins: (n,) body whose subtree's centre of mass each axis refers to.
-        com: (bodies, 3) centres of mass of the subtrees, m.
-        axes: (n, 6) filled, linear then angular.
+        model: MuJoCo's model.
+        data: Its data, which is read by every `fill`.
     """
-    x, y, z = com.take(origins, axis=0).T
-    a, b, c = cdof[:, 0], cdof[:, 1], cdof[:, 2]
-    axes[:, 0] = cdof[:, 3] + y * c - z * b
-    axes[:, 1] = cdof[:, 4] + z * a - x * c
-    axes[:, 2] = cdof[:, 5] + x * b - y * a
-    axes[:, 3:] = cdof[:, :3]
+
+    def __init__(self, model: Any, data: Any) -> None:
+        self.axes = np.zeros((model.nv, 6))
+        self.placement = np.zeros((model.nbody + model.nsite, 12))
+        self._across = np.zeros((3, 3))
+        angular, linear = data.cdof[:, :3], data.cdof[:, 3:]
+        # MuJoCo's axes are about the centre of mass of their tree, whose joints stand together.
+        root = model.body_rootid[model.dof_bodyid]
+        ends = [*(np.flatnonzero(np.diff(root)) + 1).tolist(), model.nv] if model.nv else []
+        self._trees = [
+            (data.subtree_com[root[end - 1]], angular[first:end], self.axes[first:end, :3])
+            for first, end in zip([0, *ends], ends, strict=False)
+        ]
+        self._moment, self._linear = self.axes[:, :3], linear
+        bodies, sites = self.placement[: model.nbody], self.placement[model.nbody :]
+        self._copies = [
+            (self.axes[:, 3:], angular),
+            (bodies[:, :9].reshape(-1, 3, 3), _by_columns(data.xmat)),
+            (bodies[:, 9:], data.xpos),
+            (sites[:, :9].reshape(-1, 3, 3), _by_columns(data.site_xmat)),
+            (sites[:, 9:], data.site_xpos),
+        ]
+
+    def fill(self) -> None:
+        """Bring both up to date with the data."""
+        across = self._across
+        for com, angular, found in self._trees:
+            x, y, z = com.tolist()
+            across[0, 1], across[0, 2], across[1, 2] = z, -y, x
+            across[1, 0], across[2, 0], across[2, 1] = -z, y, -x
+            np.matmul(angular, across, out=found)
+        self._moment += self._linear
+        for to, of in self._copies:
+            np.copyto(to, of)
 
 
-def placements(first: int, xmat: np.ndarray, xpos: np.ndarray, placement: np.ndarray) -> None:
-    """Write rotations (by columns) and positions into the rows from ``first`` on."""
-    rows = placement[first : first + len(xpos)]
-    rows[:, :9].reshape(-1, 3, 3)[:] = xmat.reshape(-1, 3, 3).transpose(0, 2, 1)
-    rows[:, 9:] = xpos
+def _by_columns(rotations: np.ndarray) -> np.ndarray:
+    return rotations.reshape(-1, 3, 3).transpose(0, 2, 1)
