@@ -201,7 +201,8 @@ def check_members(members: tuple[Member, ...]) -> None:
 def _remembered(plan: Plan, before: Plan | None) -> Handle:
     """Return what the plan before leaves to this one."""
     tick = plan.tick
-    plan.go_on_from(before, plan.members)
+    known = () if before is None else before.variables
+    plan.go_on(plan.heritage(before, known, plan.variables), plan.members)
     found = {
         "group": tick.group.copy(),
         "remembers": tick.kind[:, REMEMBERS].copy(),

@@ -125,7 +125,6 @@ class Packed:
         self, member: Member, index: int, first: int, axes: MotionAxes, tick: Record
     ) -> None:
         task = member.task
-        self.member = member
         self.task: Any = task
         self.index = index
         self.rows = slice(first, first + task.rows)

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from struct import pack_into
+from struct import Struct
+from typing import NamedTuple
 
 import numpy as np
 
@@ -26,12 +27,35 @@ from opspace.plan.pack_task import Packed
 from opspace.plan.scales import Scales
 from opspace.robots.adapter import AdapterBase
 from opspace.robots.motion_axes import MotionAxes
-from opspace.stack import Blending, Member, Variable
+from opspace.stack import Blending, Member, Variable, variables_of
 from opspace.tasks import JointLimits
 from opspace.tasks.task import CHANGES
 
 MOST = 62
 """Bits of a corner: more tasks, places or activations than this take the readable tick."""
+CODES = {name: float(code) for code, name in enumerate(PROFILES)}
+
+
+class Heritage(NamedTuple):
+    """What a plan takes over from the one before it.
+
+    Attributes:
+        before: The plan before, which may be the same one; None if there was none.
+        known: The activations that it has then.
+        variables: Those after it.
+        groups: Where each of them was among the known ones, −1 for nowhere; empty if all stay.
+        turns: The rotations, each with the same task in the plan before.
+    """
+
+    before: Plan | None
+    known: tuple[Variable, ...]
+    variables: tuple[Variable, ...]
+    groups: tuple[int, ...]
+    turns: tuple[tuple[Packed, Packed | None], ...]
+
+    def holds(self, before: Plan | None) -> bool:
+        """Tell whether this plan is the one before, with the activations that were foreseen."""
+        return before is self.before and (before is None or before.variables == self.known)
 
 
 class Plan:
@@ -62,7 +86,7 @@ class Plan:
         self.axes = axes
         self.limits = limits
         self.n = axes.v.size
-        self.variables: list[Member | Variable] = [*members, *_arrivals(members)]
+        self.variables = variables_of(members)
         self.levels = sorted({place.level for m in members for place in m.places})
         self.places = sorted(
             ((p.level, i, k) for i, m in enumerate(members) for k, p in enumerate(m.places)),
@@ -83,7 +107,9 @@ class Plan:
         self.seen: object = None
         self.moving = False
         self.packed = self._pack(scales)
+        # As bytes: an array takes twice as long to read a list.
         self._ramps = self.tick.variable.reshape(-1).view(np.uint8).data
+        self._write_ramps = Struct(f"{self.tick.variable.size}d").pack_into
         self._pack_variables()
         self._pack_slots()
         self.first_kept = self.tick.space.first_kept
@@ -122,44 +148,52 @@ class Plan:
         tick = self.tick
         tick.limit[:, DISTURBANCE] = tick.limit[:, SIGN] * acceleration[tick.limit_joint]
 
-    def groups(self) -> dict[object, int]:
-        """Return the group of the blend that each activation is in."""
-        return dict(zip(self.variables, self.tick.group.tolist(), strict=True))
-
-    def go_on_from(self, before: Plan | None, members: tuple[Member, ...]) -> None:
-        """Take these tasks, of the same structure, and keep what the plan before remembers of them.
+    def heritage(
+        self, before: Plan | None, known: tuple[Variable, ...], variables: tuple[Variable, ...]
+    ) -> Heritage:
+        """Find what this plan is to take over, for these activations instead of the known ones.
 
         Args:
-            before: The plan before, which may be this one: groups of the blend, turns of rotations.
+            before: The plan before, which may be this one.
+            known: The activations that it has then.
+            variables: The activations that this one will have.
+        """
+        if before is self and known == variables:
+            return Heritage(before, known, variables, (), ())
+        place = {} if before is None else {variable: i for i, variable in enumerate(known)}
+        turns: list[tuple[Packed, Packed | None]] = []
+        for packed, presence in zip(self.packed, variables, strict=False):
+            if packed.turn is not None:
+                earlier = None if before is None or presence not in place else before.packed[place[presence]]
+                turns.append((packed, earlier))
+        groups = tuple(place.get(variable, -1) for variable in variables)
+        return Heritage(before, known, variables, groups, tuple(turns))
+
+    def go_on(self, heritage: Heritage, members: tuple[Member, ...]) -> None:
+        """Take these tasks, of the same structure, and keep what is remembered of them.
+
+        Args:
+            heritage: What that is: groups of the blend, turns of rotations.
             members: The tasks with their ramps.
         """
-        variables = [*members, *_arrivals(members)]
-        if before is not self or variables != self.variables:
-            self._take_over(before, members, variables)
+        self.members, self.variables = members, heritage.variables
+        if heritage.groups:
+            group = [] if heritage.before is None else heritage.before.tick.group.tolist()
+            group.append(0)  # that of those that were not there
+            self.tick.group[:] = [group[i] for i in heritage.groups]
+            for packed, earlier in heritage.turns:
+                packed.remember(earlier)
         self._pack_variables()
-
-    def _take_over(
-        self, before: Plan | None, members: tuple[Member, ...], variables: list[Member | Variable]
-    ) -> None:
-        groups = {} if before is None else before.groups()
-        turned = [] if before is None else [p for p in before.packed if p.turn is not None]
-        known = {packed.member: packed for packed in turned}
-        self.members, self.variables = members, variables
-        self.tick.group[:] = [groups.get(v, 0) for v in variables]
-        for packed, member in zip(self.packed, members, strict=True):
-            packed.member = member
-            if packed.turn is not None:
-                packed.remember(known.get(member))
 
     def leave(self, members: Sequence[Member], blending: Blending) -> None:
         """Let the readable form go on with these tasks where this plan was at the tick before."""
-        groups = self.groups()
+        groups = dict(zip(self.variables, self.tick.group.tolist(), strict=True))
         exact, chained = (
             [who for who, group in groups.items() if group == one] for one in (EXACT, CHAINED)
         )
         blending.remember(exact, chained)
-        for packed in self.packed:
-            if packed.member in members:
+        for packed, member in zip(self.packed, self.members, strict=True):
+            if member in members:
                 packed.leave()
 
     def come_back(self, blending: Blending) -> None:
@@ -184,10 +218,9 @@ class Plan:
     def _pack_variables(self) -> None:
         rows: list[float] = []
         for variable in self.variables:
-            ramp = (variable.presence if isinstance(variable, Member) else variable).ramp
-            rows += (PROFILES.index(ramp.profile), *ramp.numbers)
-        # As bytes: an array takes twice as long to read a list.
-        pack_into(f"{len(rows)}d", self._ramps, 0, *rows)
+            profile, *numbers = variable.ramp
+            rows += (CODES[profile], *numbers)
+        self._write_ramps(self._ramps, 0, *rows)
 
     def _pack_slots(self) -> None:
         tick = self.tick
@@ -219,16 +252,6 @@ def _most_corners(variables: int, room: int) -> int:
     """Corners if everything moves: any task may be given an activation of its own at any time."""
     exact = min(variables, room)
     return 2**exact * (variables - exact + 1)
-
-
-def _arrivals(members: Sequence[Member]) -> list[Variable]:
-    """List the activations that move tasks between places, each once."""
-    found: dict[int, Variable] = {}
-    for member in members:
-        for place in member.places[1:]:  # the first place has none
-            assert place.arrival is not None
-            found.setdefault(id(place.arrival), place.arrival)
-    return list(found.values())
 
 
 def _pack_limits(limits: JointLimits, scales: Scales, tick: Record) -> None:
