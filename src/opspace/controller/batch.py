@@ -202,7 +202,8 @@ def _remembered(plan: Plan, before: Plan | None) -> Handle:
     """Return what the plan before leaves to this one."""
     tick = plan.tick
     known = () if before is None else before.variables
-    plan.go_on(plan.heritage(before, known, plan.variables), plan.members)
+    ramps = tuple(variable.ramp for variable in plan.variables)
+    plan.go_on(plan.heritage(before, known, plan.variables, ramps), plan.members)
     found = {
         "group": tick.group.copy(),
         "remembers": tick.kind[:, REMEMBERS].copy(),

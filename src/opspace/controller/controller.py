@@ -278,7 +278,8 @@ class Controller(ReferenceController):
                 plan = ready.get(key) or known.get(key) or self._planned(copies, axes)
                 ready[key] = plan
                 if before is not None and last is not None:
-                    heritage = plan.heritage(before, last.variables, outlook.variables)
+                    ramps = tuple(variable.ramp for variable in variables_of(copies))
+                    heritage = plan.heritage(before, last.variables, outlook.variables, ramps)
                     ahead[id(outlook.members)] = heritage, _laid_out(outlook.members, plan)
             before, last = plan, outlook
         for key, plan in known.items():
@@ -293,13 +294,17 @@ class Controller(ReferenceController):
         heritage, laid_out = self._ahead.get(id(members), (None, None))
         if heritage is None or laid_out is None or not heritage.holds(before):
             key = structure(members)
-            plan = before if before is not None and before.structure == key else self._ready.get(key)
+            plan = (
+                before if before is not None and before.structure == key else self._ready.get(key)
+            )
             if plan is None:
                 if not Plan.fits(members):
                     return None
                 plan = self._planned(members, self._axes)
             known = () if before is None else before.variables
-            heritage = plan.heritage(before, known, variables_of(members))
+            variables = variables_of(members)
+            ramps = tuple(variable.ramp for variable in variables)
+            heritage = plan.heritage(before, known, variables, ramps)
             laid_out = _laid_out(members, plan)
         plan = laid_out[1]
         plan.go_on(heritage, members)

@@ -169,10 +169,10 @@ class Ramp(NamedTuple):
 
     def starting(self, t: float) -> "Ramp":
         """Build the same ramp that starts at time ``t`` [s]."""
-        return self._replace(start_time=t)
+        return self if t == self.start_time else Ramp(self.profile, self.target, t, *self[3:])
 
     def finished(self, t: float) -> bool:
-        """Tell whether the ramp has arrived at its target at time ``t`` [s]; a hard switch always has."""
+        """Tell whether the ramp is at its target at time ``t`` [s]; a hard switch always is."""
         return self.duration == 0.0 or t >= self.start_time + self.duration
 
     @property

@@ -144,12 +144,12 @@ class Packed:
         kind[COVERS_ALL] = int(covers)
         tick.numbers[index] = np.zeros(NUMBERS_SIZE)
         # Which way round the rotation went, where there is one.
-        self.remembers = kind[REMEMBERS : REMEMBERS + 1]
-        self.turn: np.ndarray | None = None
+        self.remembers = kind[REMEMBERS : REMEMBERS + 1].data
+        self.turn: memoryview | None = None
         if kind[KIND] == MOTION:
             self._pack_source(axes)
             if kind[QUANTITY] != POSITION:
-                self.turn = tick.numbers[index, TURN : TURN + 4]
+                self.turn = tick.numbers[index, TURN : TURN + 4].data
         elif kind[KIND] == JOINTS:
             tick.coordinate[self.rows] = self.task.layout.coordinates
         self._pack_ahead()
@@ -205,7 +205,8 @@ class Packed:
     def come_back(self) -> None:
         """Go on with the turn of the rotation, from the readable form's tick before."""
         if self.turn is not None and self.task.quantity.turn.previous is not None:
-            self.turn[:] = self.task.quantity.turn.previous
+            for i, number in enumerate(self.task.quantity.turn.previous):
+                self.turn[i] = number
             self.remembers[0] = 1
 
     def _evaluate(self, robot: AdapterBase, t: float) -> None:

@@ -17,11 +17,13 @@ from opspace.kernels.columns import (
     LIMIT_LAW,
     LIMIT_PROFILE,
     LIMIT_WEIGHT,
+    VARIABLE_SIZE,
 )
 from opspace.kernels.limit_rows import DISTURBANCE, SIGN, SPEED
 from opspace.kernels.tick import CHAINED, EXACT
-from opspace.law import PROFILES
+from opspace.law import PROFILES, Ramp
 from opspace.machine.field_table import Record
+from opspace.machine.record import WORD
 from opspace.plan.memory import Sizes, make_tick
 from opspace.plan.pack_task import Packed
 from opspace.plan.scales import Scales
@@ -34,6 +36,8 @@ from opspace.tasks.task import CHANGES
 MOST = 62
 """Bits of a corner: more tasks, places or activations than this take the readable tick."""
 CODES = {name: float(code) for code, name in enumerate(PROFILES)}
+PACK = Struct(f"{VARIABLE_SIZE}d").pack
+ROW = VARIABLE_SIZE * WORD
 
 
 class Heritage(NamedTuple):
@@ -45,6 +49,8 @@ class Heritage(NamedTuple):
         variables: Those after it.
         groups: Where each of them was among the known ones, −1 for nowhere; empty if all stay.
         turns: The rotations, each with the same task in the plan before.
+        ramps: The ramps that the activations are expected to have.
+        packed: These as the plan's memory has them.
     """
 
     before: Plan | None
@@ -52,6 +58,8 @@ class Heritage(NamedTuple):
     variables: tuple[Variable, ...]
     groups: tuple[int, ...]
     turns: tuple[tuple[Packed, Packed | None], ...]
+    ramps: tuple[Ramp, ...]
+    packed: bytes
 
     def holds(self, before: Plan | None) -> bool:
         """Tell whether this plan is the one before, with the activations that were foreseen."""
@@ -107,10 +115,10 @@ class Plan:
         self.seen: object = None
         self.moving = False
         self.packed = self._pack(scales)
-        # As bytes: an array takes twice as long to read a list.
+        # As bytes and plain numbers: arrays take several times as long to read and write them.
         self._ramps = self.tick.variable.reshape(-1).view(np.uint8).data
-        self._write_ramps = Struct(f"{self.tick.variable.size}d").pack_into
-        self._pack_variables()
+        self.group = self.tick.group.data
+        self._ramps[:] = b"".join([_packed(variable.ramp) for variable in self.variables])
         self._pack_slots()
         self.first_kept = self.tick.space.first_kept
         depth, rows = self.tick.slots[:, 0], self.tick.slots[:, 2]
@@ -149,7 +157,11 @@ class Plan:
         tick.limit[:, DISTURBANCE] = tick.limit[:, SIGN] * acceleration[tick.limit_joint]
 
     def heritage(
-        self, before: Plan | None, known: tuple[Variable, ...], variables: tuple[Variable, ...]
+        self,
+        before: Plan | None,
+        known: tuple[Variable, ...],
+        variables: tuple[Variable, ...],
+        ramps: tuple[Ramp, ...],
     ) -> Heritage:
         """Find what this plan is to take over, for these activations instead of the known ones.
 
@@ -157,17 +169,19 @@ class Plan:
             before: The plan before, which may be this one.
             known: The activations that it has then.
             variables: The activations that this one will have.
+            ramps: The ramps that they are expected to have.
         """
+        packed = b"".join([_packed(ramp) for ramp in ramps])
         if before is self and known == variables:
-            return Heritage(before, known, variables, (), ())
+            return Heritage(before, known, variables, (), (), ramps, packed)
         place = {} if before is None else {variable: i for i, variable in enumerate(known)}
         turns: list[tuple[Packed, Packed | None]] = []
-        for packed, presence in zip(self.packed, variables, strict=False):
-            if packed.turn is not None:
-                earlier = None if before is None or presence not in place else before.packed[place[presence]]
-                turns.append((packed, earlier))
+        for one, presence in zip(self.packed, variables, strict=False):
+            if one.turn is not None:
+                i = place.get(presence)
+                turns.append((one, None if before is None or i is None else before.packed[i]))
         groups = tuple(place.get(variable, -1) for variable in variables)
-        return Heritage(before, known, variables, groups, tuple(turns))
+        return Heritage(before, known, variables, groups, tuple(turns), ramps, packed)
 
     def go_on(self, heritage: Heritage, members: tuple[Member, ...]) -> None:
         """Take these tasks, of the same structure, and keep what is remembered of them.
@@ -178,16 +192,22 @@ class Plan:
         """
         self.members, self.variables = members, heritage.variables
         if heritage.groups:
-            group = [] if heritage.before is None else heritage.before.tick.group.tolist()
+            group = [] if heritage.before is None else heritage.before.group.tolist()
             group.append(0)  # that of those that were not there
-            self.tick.group[:] = [group[i] for i in heritage.groups]
+            mine = self.group
+            for i, j in enumerate(heritage.groups):
+                mine[i] = group[j]
             for packed, earlier in heritage.turns:
                 packed.remember(earlier)
-        self._pack_variables()
+        rows = self._ramps
+        rows[:] = heritage.packed
+        for i, (variable, ramp) in enumerate(zip(heritage.variables, heritage.ramps, strict=True)):
+            if variable.ramp is not ramp:  # it started at another time than was expected
+                rows[i * ROW : (i + 1) * ROW] = _packed(variable.ramp)
 
     def leave(self, members: Sequence[Member], blending: Blending) -> None:
         """Let the readable form go on with these tasks where this plan was at the tick before."""
-        groups = dict(zip(self.variables, self.tick.group.tolist(), strict=True))
+        groups = dict(zip(self.variables, self.group, strict=True))
         exact, chained = (
             [who for who, group in groups.items() if group == one] for one in (EXACT, CHAINED)
         )
@@ -215,13 +235,6 @@ class Plan:
             packed.append(entry)
         return packed
 
-    def _pack_variables(self) -> None:
-        rows: list[float] = []
-        for variable in self.variables:
-            profile, *numbers = variable.ramp
-            rows += (CODES[profile], *numbers)
-        self._write_ramps(self._ramps, 0, *rows)
-
     def _pack_slots(self) -> None:
         tick = self.tick
         index = {id(v): i for i, v in enumerate(self.variables)}
@@ -235,6 +248,11 @@ class Plan:
             tick.slot_place[s] = chosen
             tick.slot_on[s] = chosen | 1 << i
             tick.slot_off[s] = sum({1 << index[id(arrival)] for arrival in later})
+
+
+def _packed(ramp: Ramp) -> bytes:
+    profile, *numbers = ramp
+    return PACK(CODES[profile], *numbers)
 
 
 def structure(members: Sequence[Member]) -> tuple[object, ...]:

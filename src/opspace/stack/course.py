@@ -10,16 +10,17 @@ from opspace.stack.members import Member, Variable, variables_of
 
 
 class Queued(NamedTuple):
-    """A request that waits, and its place among others, s."""
+    """A request that waits.
+
+    Attributes:
+        order: Its place among others, s.
+        start: When it is to start, s; −inf is the next tick.
+        request: The request.
+    """
 
     order: float
+    start: float
     request: Request
-
-    @property
-    def start(self) -> float:
-        """When it is to start, s; −inf is the next tick."""
-        wanted = self.request.timing.start_time
-        return -math.inf if wanted is None else wanted
 
 
 class Event(NamedTuple):
@@ -48,14 +49,27 @@ class Course:
         following: When the next of them arrives or the next request starts, s.
     """
 
-    def __init__(self, members: dict[str, Member], queue: list[Queued]) -> None:
+    def __init__(
+        self, members: dict[str, Member], queue: list[Queued], moving: tuple[Variable, ...]
+    ) -> None:
         self.members = members
         self.queue = queue
-        self.moving: tuple[Variable, ...] = ()
+        self.moving = moving
         self.following = -math.inf
+        self._arrives = self._starts = math.inf
+        self.look()
 
-    def next_event(self, t: float, before: float | None, at: float) -> Event | None:
-        """Return what happens next until a tick, or None.
+    def look(self) -> None:
+        """Find what follows, after any change."""
+        self._starts = self.queue[0].start if self.queue else math.inf
+        self._arrives = math.inf
+        for variable in self.moving:
+            ramp = variable.ramp
+            self._arrives = min(self._arrives, ramp.start_time + ramp.duration)
+        self.following = min(self._arrives, self._starts)
+
+    def next_event(self, t: float, before: float | None, at: float) -> Event:
+        """Return the first event until a tick that comes after `following`.
 
         Args:
             t: Time of the tick, s.
@@ -63,16 +77,17 @@ class Course:
                 this tick: an earlier start would be a step.
             at: Time of the last event in this tick, s; nothing starts before it.
         """
-        arrives = min([variable.end for variable in self.moving], default=math.inf)
-        starts = self.queue[0].start if self.queue else math.inf
+        arrives, starts = self._arrives, self._starts
         if starts <= (t if before is None else min(before, t)):
             starts = t
         time = max(min(arrives, starts), at)
-        if time > t or (arrives > t and starts > t):
-            return None
-        due = [queued.request for queued in self.queue if queued.start <= time]
-        arrivals = tuple([variable for variable in self.moving if variable.end <= time])
-        return Event(time, tuple(due) if starts <= time else (), arrivals)
+        requests: list[Request] = []
+        if starts <= time:
+            requests = [queued.request for queued in self.queue if queued.start <= time]
+        arrivals: list[Variable] = []
+        if arrives <= time:
+            arrivals = [variable for variable in self.moving if variable.end <= time]
+        return Event(time, tuple(requests), tuple(arrivals))
 
     def play(self, event: Event) -> bool:
         """Let an event happen.
@@ -89,13 +104,6 @@ class Course:
         self.moving = tuple(
             [v for v in variables_of(self.members.values()) if not v.arrived(event.time)]
         )
-        self.drop(event.requests)
+        del self.queue[: len(event.requests)]
+        self.look()
         return bool(event.requests or gone or any(tidied))
-
-    def drop(self, started: tuple[Request, ...]) -> None:
-        """Take requests that have started from the queue, and find what follows."""
-        del self.queue[: len(started)]
-        times = [variable.end for variable in self.moving]
-        if self.queue:
-            times.append(self.queue[0].start)
-        self.following = min(times, default=math.inf)

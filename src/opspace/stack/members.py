@@ -42,8 +42,8 @@ class Variable:
         return ramp(t, PROFILES.index(name), *numbers)
 
     def idle(self, t: float) -> bool:
-        """Tell whether it has had no effect up to time ``t`` [s] and may be forgotten."""
-        return self.value(t) == 0.0
+        """Tell whether it only begins at time ``t`` [s], has had no effect and may be forgotten."""
+        return t <= self.ramp.start_time and self.value(t) == 0.0
 
     def send(self, target: float, duration: float, t: float, profile: str) -> None:
         """Turn it towards 0 or 1 at time ``t`` [s], to arrive ``duration`` [s] later.

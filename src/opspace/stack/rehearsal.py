@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from copy import copy, deepcopy
+import math
+from collections.abc import Callable, Iterator
+from copy import copy
 from typing import Any, NamedTuple, TypeVar
 
 from opspace.law import Ramp
@@ -64,13 +65,14 @@ class Outcome(NamedTuple):
     def happen(self, course: Course, time: float) -> None:
         """Do to a stack what `Course.play` would do at this time [s]."""
         for variable, ramp in self.starts:
-            variable.ramp = ramp.starting(time)
+            variable.ramp = ramp.starting(time)  # the very same one where the time was known
         for variable, ramp in self.turns:
             variable.send(ramp.target, ramp.duration, time, ramp.profile)
         for member, places in self.places:
             member.places = places
         course.members, course.moving = self.members, self.moving
-        course.drop(self.requests)
+        del course.queue[: len(self.requests)]
+        course.look()
 
 
 class Rehearsal:
@@ -90,27 +92,32 @@ class Rehearsal:
         present: tuple[Member, ...],
         now: float | None,
     ) -> None:
-        members = course.members
-        copies: dict[int, Any] = {id(m.task): m.task for m in members.values()}
-        self._course = Course(deepcopy(members, copies), queue)
-        self._course.moving = tuple(copies[id(v)] for v in course.moving)
-        self._course.drop(())
-        originals = [*members.values(), *variables_of(members.values())]
-        self._originals: dict[Any, Any] = {copies[id(one)]: one for one in originals}
+        self._originals: dict[Any, Any] = {}
+        copies: dict[Any, Any] = {}
+
+        def copied(one: Variable) -> Variable:
+            if one not in copies:
+                copies[one] = copy(one)
+                self._originals[copies[one]] = one
+            return copies[one]
+
+        members = {name: copy(member) for name, member in course.members.items()}
+        for name, member in members.items():
+            member.presence = copied(member.presence)
+            member.places = _places(member, copied)
+            self._originals[member] = course.members[name]
+        self._course = Course(members, queue, tuple(copies[v] for v in course.moving))
         self._present = present
         self._now = now
-        originals = [*members.values(), *variables_of(members.values())]
-        self._originals: dict[object, object] = {copies[id(one)]: one for one in originals}
         self.outcomes: list[Outcome] = []
 
     def outlooks(self) -> Iterator[Outlook]:
         """Give the tasks as they are, then as they are after each event."""
-        course, time = self._course, self._now or 0.0
+        # The next tick is later than the last one: what began there is on its way.
+        course, time = self._course, math.nextafter(self._now or 0.0, math.inf)
         yield self._outlook()
-        for _ in range(AHEAD):
+        while course.following < math.inf and len(self.outcomes) < AHEAD:
             event = course.next_event(max(course.following, time), time, time)
-            if event is None:
-                return
             time = event.time
             self.outcomes.append(self._played(event))
             yield self._outlook()
@@ -131,8 +138,11 @@ class Rehearsal:
         for variable in variables_of(course.members.values()):
             before, ramp = ramps.get(variable), variable.ramp
             if ramp is not before:
-                on_way = before is not None and not before.finished(event.time)
-                turned = on_way and before.towards(ramp.target, ramp.duration, event.time) == ramp
+                turned = (
+                    before is not None
+                    and not before.finished(event.time)
+                    and before.towards(ramp.target, ramp.duration, event.time) == ramp
+                )
                 (turns if turned else starts).append((self._original(variable), ramp))
         members = {name: self._original(m) for name, m in course.members.items()}
         if changed:
@@ -146,7 +156,7 @@ class Rehearsal:
             tuple(starts),
             tuple(turns),
             tuple(
-                (self._original(m), self._places(m))
+                (self._original(m), _places(m, self._original))
                 for m in course.members.values()
                 if m.places is not places.get(m)
             ),
@@ -155,17 +165,17 @@ class Rehearsal:
 
     def _original(self, one: T) -> T:
         """Return what this is a copy of; of what comes into being here, a copy is the original."""
-        found = self._originals.get(one)
-        if found is None:
-            found = copy(one)
-            self._originals[one] = found
+        if one not in self._originals:
+            found = self._originals[one] = copy(one)
             if isinstance(found, Member):
                 found.presence = self._original(found.presence)
-                found.places = self._places(one)
-        return found
+                found.places = _places(found, self._original)
+        return self._originals[one]
 
-    def _places(self, member: Member) -> tuple[Place, ...]:
-        return tuple(
-            Place(p.level, None if p.arrival is None else self._original(p.arrival))
-            for p in member.places
-        )
+
+def _places(member: Member, known: Callable[[Variable], Variable]) -> tuple[Place, ...]:
+    """Give the places of a member with these activations instead of its own."""
+    return tuple(
+        Place(place.level, None if place.arrival is None else known(place.arrival))
+        for place in member.places
+    )

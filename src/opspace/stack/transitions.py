@@ -25,7 +25,7 @@ class Transitions:
     """
 
     def __init__(self) -> None:
-        self._course = Course({}, [])
+        self._course = Course({}, [], ())
         self._now: float | None = None
         self._ticked: tuple[Member, ...] = ()
         self._prepare: Callable[[Task], None] | None = None
@@ -96,6 +96,7 @@ class Transitions:
         with self._requesting:
             with self._lock:
                 self._course.queue.clear()
+                self._course.look()
                 self._coming.clear()
             coming, happened = self._look_ahead()
             with self._lock:
@@ -154,7 +155,8 @@ class Transitions:
     def _let_happen(self, t: float) -> None:
         """Go through the events until time ``t`` [s], as foreseen where they are."""
         course, at = self._course, -math.inf
-        while (event := course.next_event(t, self._now, at)) is not None:
+        while course.following <= t:
+            event = course.next_event(t, self._now, at)
             at = event.time
             self._happened += 1
             if self._coming and self._coming[0].fits(event):
@@ -197,6 +199,7 @@ class Transitions:
 
     def _add(self, request: Request) -> None:
         insort(self._course.queue, self._checked(request), key=lambda queued: queued.order)
+        self._course.look()
 
     def _checked(self, request: Request) -> Queued:
         """Go through everything that is asked, in the order in which it will happen."""
@@ -206,7 +209,8 @@ class Transitions:
         }
         now = -math.inf if self._now is None else self._now
         wanted = request.timing.start_time
-        new = Queued(now if wanted is None else max(wanted, now), request)
+        start = -math.inf if wanted is None else wanted
+        new = Queued(max(start, now), start, request)
         for queued in self._course.queue:
             if queued.order <= new.order:
                 queued.request.check(known)

@@ -77,7 +77,8 @@ class TrackingTask(Task):
 
     def reset(self) -> None:
         """Forget the held start value; the next tick finds a new one."""
-        self._held = None
+        if self._held is not None:  # else nothing changes, and no tick need look
+            self._held = None
 
     @property
     def target(self) -> Array | Reference | None:
