@@ -131,7 +131,6 @@ class Packed:
         self, member: Member, index: int, first: int, axes: MotionAxes, tick: Record
     ) -> None:
         task = member.task
-        self.member = member
         self.task: Any = task
         self.index = index
         self.rows = slice(first, first + task.rows)
@@ -151,7 +150,7 @@ class Packed:
         kind[COVERS_ALL] = int(covers)
         tick.numbers[index] = np.zeros(NUMBERS_SIZE)
         # Which way round angles went, where there are any.
-        self.remembers = kind[REMEMBERS : REMEMBERS + 1]
+        self.remembers = kind[REMEMBERS : REMEMBERS + 1].data
         self.turn = tick.numbers[index, TURN : TURN + 4]
         self.way_round: WayRound | None = None
         self._turning = np.zeros(0)
@@ -207,8 +206,15 @@ class Packed:
             return  # none is remembered, or it is there already
         if before is None or before.way_round is None:
             self.remembers[0] = 0
-        else:
+        elif self._timed or before._timed or not self._agrees(before):
             self._go_on(before.remembers[0], before.turn, before._turning)
+        else:  # on the way to the same goal
+            self.remembers[0] = before.remembers[0]
+            self.turn[:] = before.turn
+
+    def _agrees(self, before: Packed) -> bool:
+        """Tell whether both have packed the same target."""
+        return self.target is before.target and self.held is before.held
 
     def leave(self) -> None:
         """Let the readable form go on with the way round, from the tick before."""

@@ -138,7 +138,9 @@ class TrackingTask(Task):
 
     def reset(self) -> None:
         """Forget the held start value, the integral, and where a way has come to."""
-        self._held = self._led = self._before = self._integral = None
+        memory = self._held, self._led, self._before, self._integral
+        if any(part is not None for part in memory):  # else nothing changes, and no tick need look
+            self._held = self._led = self._before = self._integral = None
 
     @property
     def ki(self) -> float | None:
