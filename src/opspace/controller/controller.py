@@ -301,23 +301,12 @@ class Controller(ReferenceController):
 
     def _lay_out(self, members: tuple[Member, ...]) -> _LaidOut | None:
         """Take up the plan for these tasks, or None where there are too many of them."""
-        assert self._axes is not None
-        before = self._plan
-        heritage, laid_out = self._ahead.get(id(members), (None, None))
-        if heritage is None or laid_out is None or not heritage.holds(before):
-            key = structure(members)
-            plan = (
-                before if before is not None and before.structure == key else self._ready.get(key)
-            )
-            if plan is None:
-                if not Plan.fits(members):
-                    return None
-                plan = self._planned(members, self._axes)
-            known = () if before is None else before.variables
-            variables = variables_of(members)
-            ramps = tuple(variable.ramp for variable in variables)
-            heritage = plan.heritage(before, known, variables, ramps)
-            laid_out = _laid_out(members, plan)
+        found = self._ahead.get(id(members))
+        if found is None or not found[0].holds(self._plan):
+            found = self._laid_out_now(members)
+            if found is None:
+                return None
+        heritage, laid_out = found
         plan = laid_out[1]
         plan.go_on(heritage, members)
         if self._readable:
@@ -325,6 +314,20 @@ class Controller(ReferenceController):
             self._readable = False
         self._plan, self._laid_out = plan, laid_out
         return laid_out
+
+    def _laid_out_now(self, members: tuple[Member, ...]) -> tuple[Heritage, _LaidOut] | None:
+        """Lay out what was not foreseen, or what something else has come before."""
+        assert self._axes is not None
+        before, key = self._plan, structure(members)
+        plan = before if before is not None and before.structure == key else self._ready.get(key)
+        if plan is None:
+            if not Plan.fits(members):
+                return None
+            plan = self._planned(members, self._axes)
+        variables = variables_of(members)
+        known = () if before is None else before.variables
+        heritage = plan.heritage(before, known, variables, tuple(v.ramp for v in variables))
+        return heritage, _laid_out(members, plan)
 
     def _leave(self, members: tuple[Member, ...]) -> None:
         """Let the readable form go on from the compiled one."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from array import array
+from collections.abc import Iterable
 from inspect import isfunction
 from typing import Any
 
@@ -116,6 +118,12 @@ def _overrides(task: Task, built_in: type[Task]) -> bool:
     return bool(own - HONOURED)
 
 
+def _silent(task: Task) -> bool:
+    """Tell whether its class may decide anew at every tick what it has, or tells nobody of changes."""
+    kind = type(task)
+    return kind.activation is not None or kind.__setattr__ is not Task.__setattr__
+
+
 class Packed:
     """One task in the arrays of a plan.
 
@@ -151,7 +159,7 @@ class Packed:
         tick.numbers[index] = np.zeros(NUMBERS_SIZE)
         # Which way round angles went, where there are any.
         self.remembers = kind[REMEMBERS : REMEMBERS + 1].data
-        self.turn = tick.numbers[index, TURN : TURN + 4]
+        self.turn = tick.numbers[index, TURN : TURN + 4].data
         self.way_round: WayRound | None = None
         self._turning = np.zeros(0)
         if kind[KIND] == MOTION:
@@ -195,10 +203,15 @@ class Packed:
             or task._gains is not self.gains
         ):
             self._pack(robot, t)
-        # A class may decide anew at every tick what its tasks have, or tell nobody of changes.
-        kind = type(task)
-        silent = kind.activation is not None or kind.__setattr__ is not Task.__setattr__
-        self.moving = self.own_kind or self._timed or self._own_activation or silent
+        self.moving = self.own_kind or self._timed or self._own_activation or _silent(task)
+
+    @property
+    def settled(self) -> bool:
+        """Whether all is packed that a tick would pack, until the task says that it has changed."""
+        task = self.task
+        if self.own_kind or task.activation is not None or _silent(task):
+            return False
+        return self.target is task._target and self.held is task._held and not self._timed
 
     def remember(self, before: Packed | None) -> None:
         """Go on from the same task in the plan before: which way round it went, and to where."""
@@ -235,10 +248,10 @@ class Packed:
         """Take the short way at the next tick."""
         self.remembers[0] = 0
 
-    def _go_on(self, remembers: int, turn: Any, goal: np.ndarray) -> None:
+    def _go_on(self, remembers: int, turn: Iterable[float], goal: np.ndarray) -> None:
         """Take over the way round to a goal; whether the target is still there is seen at packing."""
         self.remembers[0] = remembers
-        self.turn[:] = turn
+        self.turn[:] = array("d", turn)
         self._turning[:] = goal
         self.target = None
 
@@ -246,13 +259,13 @@ class Packed:
         tick, rows = self._tick, self.rows
         robot.check_state(robot.q, robot.v)
         terms = self.task.evaluate(robot, t)
-        for given, array in (
+        for given, kept in (
             (terms.J, tick.J),
             (terms.drift, tick.drift),
             (terms.acceleration, tick.wanted),
             (terms.error, tick.error),
         ):
-            array[rows] = self._checked(given, array[rows].shape, t)
+            kept[rows] = self._checked(given, kept[rows].shape, t)
 
     def _checked(self, given: object, shape: tuple[int, ...], t: float) -> np.ndarray:
         found = np.asarray(given, dtype=float)

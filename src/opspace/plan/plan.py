@@ -38,6 +38,8 @@ MOST = 62
 CODES = {name: float(code) for code, name in enumerate(PROFILES)}
 PACK = Struct(f"{VARIABLE_SIZE}d").pack
 ROW = VARIABLE_SIZE * WORD
+NOWHERE = np.array([NO_GROUP], np.int64).tobytes()
+"""The group of an activation that was not there."""
 
 
 class Heritage(NamedTuple):
@@ -47,7 +49,7 @@ class Heritage(NamedTuple):
         before: The plan before, which may be the same one; None if there was none.
         known: The activations that it has then.
         variables: Those after it.
-        groups: Where each of them was among the known ones, −1 for nowhere; empty if all stay.
+        groups: Where the group of each of them is remembered; None if all stay where they are.
         turns: The tasks with angles, each with the same task in the plan before.
         ramps: The ramps that the activations are expected to have.
         packed: These as the plan's memory has them.
@@ -56,7 +58,7 @@ class Heritage(NamedTuple):
     before: Plan | None
     known: tuple[Variable, ...]
     variables: tuple[Variable, ...]
-    groups: tuple[int, ...]
+    groups: tuple[memoryview | bytes, ...] | None
     turns: tuple[tuple[Packed, Packed | None], ...]
     ramps: tuple[Ramp, ...]
     packed: bytes
@@ -112,12 +114,14 @@ class Plan:
             corners=blending.most_corners(len(self.variables)),
         )
         self.tick, self.memory = make_tick(self.size, axes, torque_limit, options)
-        self.seen: object = None
-        self.moving = False
+        last = CHANGES.last
         self.packed = self._pack(scales)
-        # As bytes and plain numbers: arrays take several times as long to read and write them.
+        # Where everything is known ahead, the first tick need not look.
+        self.moving = False
+        self.seen: object = last if all(packed.settled for packed in self.packed) else None
+        # As bytes: arrays take several times as long to read and write them.
         self._ramps = self.tick.variable.reshape(-1).view(np.uint8).data
-        self.group = self.tick.group.data
+        self._groups = self.tick.group.view(np.uint8).data
         self._ramps[:] = b"".join([_packed(variable.ramp) for variable in self.variables])
         self._pack_slots()
         self.first_kept = self.tick.space.first_kept
@@ -173,15 +177,22 @@ class Plan:
         """
         packed = b"".join([_packed(ramp) for ramp in ramps])
         if before is self and known == variables:
-            return Heritage(before, known, variables, (), (), ramps, packed)
+            return Heritage(before, known, variables, None, (), ramps, packed)
         place = {} if before is None else {variable: i for i, variable in enumerate(known)}
         turns: list[tuple[Packed, Packed | None]] = []
         for one, presence in zip(self.packed, variables, strict=False):
             if one.way_round is not None:
                 i = place.get(presence)
                 turns.append((one, None if before is None or i is None else before.packed[i]))
-        groups = tuple(place.get(variable, -1) for variable in variables)
-        return Heritage(before, known, variables, groups, tuple(turns), ramps, packed)
+        groups = [
+            NOWHERE if before is None or (i := place.get(variable)) is None else before.group(i)
+            for variable in variables
+        ]
+        return Heritage(before, known, variables, tuple(groups), tuple(turns), ramps, packed)
+
+    def group(self, i: int) -> memoryview:
+        """Return the memory of the group that an activation is in."""
+        return self._groups[i * WORD : (i + 1) * WORD]
 
     def go_on(self, heritage: Heritage, members: tuple[Member, ...]) -> None:
         """Take these tasks, of the same structure, and keep what is remembered of them.
@@ -191,20 +202,19 @@ class Plan:
             members: The tasks with their ramps.
         """
         self.members, self.variables = members, heritage.variables
-        if heritage.groups:
-            group = [] if heritage.before is None else heritage.before.group.tolist()
-            group.append(NO_GROUP)  # that of those that were not there
-            mine = self.group
-            for i, j in enumerate(heritage.groups):
-                mine[i] = group[j]
+        if heritage.groups is not None:
+            self._groups[:] = b"".join(heritage.groups)
             for packed, earlier in heritage.turns:
                 packed.remember(earlier)
-            self.seen = None  # a target may have gone on meanwhile
+                if packed.target is None:
+                    self.seen = None
         rows = self._ramps
         rows[:] = heritage.packed
-        for i, (variable, ramp) in enumerate(zip(heritage.variables, heritage.ramps, strict=True)):
+        i = 0
+        for variable, ramp in zip(heritage.variables, heritage.ramps, strict=True):
             if variable.ramp is not ramp:  # it started at another time than was expected
-                rows[i * ROW : (i + 1) * ROW] = _packed(variable.ramp)
+                rows[i : i + ROW] = _packed(variable.ramp)
+            i += ROW
 
     def forget_ways(self) -> None:
         """Let all angles take the short way at the next tick."""
@@ -213,7 +223,7 @@ class Plan:
 
     def leave(self, members: Sequence[Member], blending: Blending) -> None:
         """Let the readable form go on with these tasks where this plan was at the tick before."""
-        blending.remember(dict(zip(self.variables, self.group, strict=True)))
+        blending.remember(dict(zip(self.variables, self.tick.group.tolist(), strict=True)))
         for packed, member in zip(self.packed, self.members, strict=True):
             if member in members:
                 packed.leave()

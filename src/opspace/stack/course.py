@@ -50,7 +50,9 @@ class Course:
 
     Attributes:
         moving: The activations that are on their way.
-        following: When the next of them arrives or the next request starts, s.
+        arrives: When the next of them arrives, s.
+        starts: When the next request starts, s.
+        following: The earlier of both times.
     """
 
     def __init__(
@@ -60,17 +62,17 @@ class Course:
         self.queue = queue
         self.moving = moving
         self.following = -math.inf
-        self._arrives = self._starts = math.inf
+        self.arrives = self.starts = math.inf
         self.look()
 
     def look(self) -> None:
         """Find what follows, after any change."""
-        self._starts = self.queue[0].start if self.queue else math.inf
-        self._arrives = math.inf
+        self.starts = self.queue[0].start if self.queue else math.inf
+        self.arrives = math.inf
         for variable in self.moving:
             ramp = variable.ramp
-            self._arrives = min(self._arrives, ramp.start_time + ramp.duration)
-        self.following = min(self._arrives, self._starts)
+            self.arrives = min(self.arrives, ramp.start_time + ramp.duration)
+        self.following = min(self.arrives, self.starts)
 
     def wait(self, pause: float) -> None:
         """Let everything happen so much later, s."""
@@ -88,7 +90,7 @@ class Course:
                 this tick: an earlier start would be a step.
             at: Time of the last event in this tick, s; nothing starts before it.
         """
-        arrives, starts = self._arrives, self._starts
+        arrives, starts = self.arrives, self.starts
         if starts <= (t if before is None else min(before, t)):
             starts = t
         time = max(min(arrives, starts), at)

@@ -46,6 +46,7 @@ class Outcome(NamedTuple):
         turns: Ramps that leave another one on its way, wherever that will be then.
         places: Where tasks are, if that changes.
         moving: The activations that are on their way after it.
+        following: When the next event comes at the earliest, s.
     """
 
     requests: tuple[Request, ...]
@@ -57,13 +58,14 @@ class Outcome(NamedTuple):
     turns: tuple[tuple[Variable, Ramp], ...]
     places: tuple[tuple[Member, tuple[Place, ...]], ...]
     moving: tuple[Variable, ...]
+    following: float
 
     def fits(self, event: Event) -> bool:
         """Tell whether this is the event that was foreseen, whenever it happens."""
         return event.requests == self.requests and event.arrivals == self.arrivals
 
     def happen(self, course: Course, time: float) -> None:
-        """Do to a stack what `Course.play` would do at this time [s]."""
+        """Do to a stack what `Course.play` would do at this time [s], but look for what follows."""
         for variable, ramp in self.starts:
             variable.ramp = ramp.starting(time)  # the very same one where the time was known
         for variable, ramp in self.turns:
@@ -72,7 +74,6 @@ class Outcome(NamedTuple):
             member.places = places
         course.members, course.moving = self.members, self.moving
         del course.queue[: len(self.requests)]
-        course.look()
 
 
 class Rehearsal:
@@ -161,6 +162,7 @@ class Rehearsal:
                 if m.places is not places.get(m)
             ),
             tuple(self._original(v) for v in course.moving),
+            course.following,
         )
 
     def _original(self, one: T) -> T:

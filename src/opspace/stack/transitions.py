@@ -10,7 +10,7 @@ from threading import Lock, RLock
 
 from opspace.errors import InputError, OpspaceError
 from opspace.stack.changes import Insert, Known, Request
-from opspace.stack.course import Course, Queued
+from opspace.stack.course import Course, Event, Queued
 from opspace.stack.members import Member, Place, Variable
 from opspace.stack.rehearsal import Outcome, Outlook, Rehearsal
 from opspace.tasks import Task
@@ -33,6 +33,8 @@ class Transitions:
         # Outcomes of the events to come, good as long as no other one happens before.
         self._coming: deque[Outcome] = deque()
         self._happened = 0
+        # The first of them, once it is sure to be the next thing to happen.
+        self._ripe: Outcome | None = None
         # Nothing happens to the stack before this time, unless something new is asked.
         self._next = -math.inf
         self._asked = False
@@ -99,6 +101,7 @@ class Transitions:
                 self._course.queue.clear()
                 self._course.look()
                 self._coming.clear()
+                self._ripe = None
             coming, happened = self._look_ahead()
             with self._lock:
                 self._expect(coming, happened)
@@ -167,6 +170,7 @@ class Transitions:
         pause = t - self._now
         self._course.wait(pause)
         self._coming.clear()  # requests and ramps are others now
+        self._ripe = None
         self._now = t
         self._ticked = tuple(self._course.members.values())  # another object, for its ramps
         for member in self._ticked:
@@ -174,24 +178,53 @@ class Transitions:
 
     def _let_happen(self, t: float) -> None:
         """Go through the events until time ``t`` [s], as foreseen where they are."""
-        course, at = self._course, -math.inf
+        course, before = self._course, t if self._now is None else self._now
+        if self._ripe is not None and course.following <= t < self._ripe.following:
+            late = course.starts <= before
+            if not late or course.arrives > t:  # else what arrives until then comes first
+                self._happen(self._ripe, t if late else course.following)
+                self._ripe, self._asked = None, True  # what follows is looked for in the next tick
+                return
+        course.look()
+        at = -math.inf
         while course.following <= t:
             event = course.next_event(t, self._now, at)
             at = event.time
-            self._happened += 1
             if self._coming and self._coming[0].fits(event):
-                outcome = self._coming.popleft()
-                outcome.happen(course, at)
-                self._ticked, new = outcome.present, outcome.new
+                self._happen(self._coming[0], at)
+                course.look()
             else:
-                self._coming.clear()
-                changed, before = course.play(event), self._ticked
-                if changed:
-                    self._ticked = tuple(course.members.values())
-                new = [member.task for member in self._ticked if member not in before]
-            for task in new:
-                task.reset()
+                self._play(event)
         self._next = course.following
+        self._ripe = self._ripening(t)
+
+    def _happen(self, outcome: Outcome, time: float) -> None:
+        """Do what was foreseen."""
+        self._happened += 1
+        self._coming.popleft()
+        outcome.happen(self._course, time)
+        self._ticked = outcome.present
+        for task in outcome.new:
+            task.reset()
+
+    def _play(self, event: Event) -> None:
+        """Do what was not foreseen, after which nothing is any more."""
+        self._happened += 1
+        self._coming.clear()
+        before = self._ticked
+        if self._course.play(event):
+            self._ticked = tuple(self._course.members.values())
+        for member in self._ticked:
+            if member not in before:
+                member.task.reset()
+
+    def _ripening(self, t: float) -> Outcome | None:
+        """Return the outcome of the next event after time ``t`` [s], if it was foreseen."""
+        course = self._course
+        if not self._coming or course.following == math.inf:
+            return None
+        event = course.next_event(max(course.following, math.nextafter(t, math.inf)), t, -math.inf)
+        return self._coming[0] if self._coming[0].fits(event) else None
 
     def _look_ahead(self, request: Request | None = None) -> tuple[list[Outcome], int]:
         """Go through what is to come on a copy, in the thread that asks.
@@ -212,6 +245,8 @@ class Transitions:
     def _expect(self, coming: list[Outcome], happened: int) -> None:
         """Follow these outcomes, unless something else has happened meanwhile."""
         self._coming = deque(coming if happened == self._happened else ())
+        self._course.look()
+        self._ripe = self._ripening(-math.inf if self._now is None else self._now)
         self._asked = True
 
     def _waiting(self) -> list[Task]:
@@ -219,7 +254,6 @@ class Transitions:
 
     def _add(self, request: Request) -> None:
         insort(self._course.queue, self._checked(request), key=lambda queued: queued.order)
-        self._course.look()
 
     def _checked(self, request: Request) -> Queued:
         """Go through everything that is asked, in the order in which it will happen."""
