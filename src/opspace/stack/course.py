@@ -27,7 +27,7 @@ class Queued(NamedTuple):
         return Queued(self.order + pause, self.start + pause, self.request.later(pause))
 
 
-class Event(NamedTuple):
+class Happening(NamedTuple):
     """Something that happens to a stack.
 
     Attributes:
@@ -81,7 +81,7 @@ class Course:
         self.queue = [queued.later(pause) for queued in self.queue]
         self.look()
 
-    def next_event(self, t: float, before: float | None, at: float) -> Event:
+    def next_event(self, t: float, before: float | None, at: float) -> Happening:
         """Return the first event until a tick that comes after `following`.
 
         Args:
@@ -100,9 +100,9 @@ class Course:
         arrivals: list[Variable] = []
         if arrives <= time:
             arrivals = [variable for variable in self.moving if variable.end <= time]
-        return Event(time, tuple(requests), tuple(arrivals))
+        return Happening(time, tuple(requests), tuple(arrivals))
 
-    def play(self, event: Event) -> bool:
+    def play(self, event: Happening) -> bool:
         """Let an event happen.
 
         Returns:

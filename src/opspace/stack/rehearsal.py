@@ -9,7 +9,7 @@ from typing import Any, NamedTuple, TypeVar
 
 from opspace.law import Ramp
 from opspace.stack.changes import Request
-from opspace.stack.course import Course, Event, Queued
+from opspace.stack.course import Course, Happening, Queued
 from opspace.stack.members import Member, Place, Variable, variables_of
 from opspace.tasks import Task
 
@@ -33,7 +33,7 @@ class Outlook(NamedTuple):
     copies: tuple[Member, ...]
 
 
-class Outcome(NamedTuple):
+class Foreseen(NamedTuple):
     """What an event will have done to a stack.
 
     Attributes:
@@ -60,7 +60,7 @@ class Outcome(NamedTuple):
     moving: tuple[Variable, ...]
     following: float
 
-    def fits(self, event: Event) -> bool:
+    def fits(self, event: Happening) -> bool:
         """Tell whether this is the event that was foreseen, whenever it happens."""
         return event.requests == self.requests and event.arrivals == self.arrivals
 
@@ -110,7 +110,7 @@ class Rehearsal:
         self._course = Course(members, queue, tuple(copies[v] for v in course.moving))
         self._present = present
         self._now = now
-        self.outcomes: list[Outcome] = []
+        self.outcomes: list[Foreseen] = []
 
     def outlooks(self) -> Iterator[Outlook]:
         """Give the tasks as they are, then as they are after each event."""
@@ -128,7 +128,7 @@ class Rehearsal:
         variables = tuple(self._original(v) for v in variables_of(copies))
         return Outlook(self._present, variables, copies)
 
-    def _played(self, event: Event) -> Outcome:
+    def _played(self, event: Happening) -> Foreseen:
         """Let an event happen to the copies, and say what it does to the originals."""
         course = self._course
         ramps = {v: v.ramp for v in variables_of(course.members.values())}
@@ -148,7 +148,7 @@ class Rehearsal:
         members = {name: self._original(m) for name, m in course.members.items()}
         if changed:
             self._present = tuple(members.values())
-        return Outcome(
+        return Foreseen(
             event.requests,
             tuple(self._original(v) for v in event.arrivals),
             members,

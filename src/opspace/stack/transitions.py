@@ -10,9 +10,9 @@ from threading import Lock, RLock
 
 from opspace.errors import InputError, OpspaceError
 from opspace.stack.changes import Insert, Known, Request
-from opspace.stack.course import Course, Event, Queued
+from opspace.stack.course import Course, Happening, Queued
 from opspace.stack.members import Member, Place, Variable
-from opspace.stack.rehearsal import Outcome, Outlook, Rehearsal
+from opspace.stack.rehearsal import Foreseen, Outlook, Rehearsal
 from opspace.tasks import Task
 
 
@@ -31,10 +31,10 @@ class Transitions:
         self._prepare: Callable[[Task], None] | None = None
         self._foresee: Callable[[Iterator[Outlook]], None] | None = None
         # Outcomes of the events to come, good as long as no other one happens before.
-        self._coming: deque[Outcome] = deque()
+        self._coming: deque[Foreseen] = deque()
         self._happened = 0
         # The first of them, once it is sure to be the next thing to happen.
-        self._ripe: Outcome | None = None
+        self._ripe: Foreseen | None = None
         # Nothing happens to the stack before this time, unless something new is asked.
         self._next = -math.inf
         self._asked = False
@@ -198,7 +198,7 @@ class Transitions:
         self._next = course.following
         self._ripe = self._ripening(t)
 
-    def _happen(self, outcome: Outcome, time: float) -> None:
+    def _happen(self, outcome: Foreseen, time: float) -> None:
         """Do what was foreseen."""
         self._happened += 1
         self._coming.popleft()
@@ -207,7 +207,7 @@ class Transitions:
         for task in outcome.new:
             task.reset()
 
-    def _play(self, event: Event) -> None:
+    def _play(self, event: Happening) -> None:
         """Do what was not foreseen, after which nothing is any more."""
         self._happened += 1
         self._coming.clear()
@@ -218,7 +218,7 @@ class Transitions:
             if member not in before:
                 member.task.reset()
 
-    def _ripening(self, t: float) -> Outcome | None:
+    def _ripening(self, t: float) -> Foreseen | None:
         """Return the outcome of the next event after time ``t`` [s], if it was foreseen."""
         course = self._course
         if not self._coming or course.following == math.inf:
@@ -226,7 +226,7 @@ class Transitions:
         event = course.next_event(max(course.following, math.nextafter(t, math.inf)), t, -math.inf)
         return self._coming[0] if self._coming[0].fits(event) else None
 
-    def _look_ahead(self, request: Request | None = None) -> tuple[list[Outcome], int]:
+    def _look_ahead(self, request: Request | None = None) -> tuple[list[Foreseen], int]:
         """Go through what is to come on a copy, in the thread that asks.
 
         Returns:
@@ -242,7 +242,7 @@ class Transitions:
         self._foresee(rehearsal.outlooks())
         return rehearsal.outcomes, happened
 
-    def _expect(self, coming: list[Outcome], happened: int) -> None:
+    def _expect(self, coming: list[Foreseen], happened: int) -> None:
         """Follow these outcomes, unless something else has happened meanwhile."""
         self._coming = deque(coming if happened == self._happened else ())
         self._course.look()
