@@ -13,6 +13,10 @@ from opspace.tasks.references.sample import Sample
 from opspace.tasks.references.start import Started, optional_time
 from opspace.tasks.validation import Array, finite_array
 
+ROUNDING = 1e-12
+"""Part of a unit by which a motion may end beside its goal: it is no step, and on a way as short as this
+there is no jerk to make good for it."""
+
 
 class JerkLimited(Started):
     """Moves to rest at the goal as fast as velocity, acceleration and jerk limits allow.
@@ -74,7 +78,8 @@ class JerkLimited(Started):
         _calculate(motion, self._trajectory, size)
         self.duration: float = self._trajectory.duration
         # The plan ends beside the goal by up to 1e-8, which would be a step there.
-        self._beside = self.goal - np.array(self._trajectory.at_time(self.duration)[0])
+        beside = self.goal - np.array(self._trajectory.at_time(self.duration)[0])
+        self._beside = np.where(np.abs(beside) > ROUNDING, beside, 0.0)
 
     def __call__(self, t: float, /) -> Sample:
         """Return the desired motion at time t, s."""
