@@ -58,7 +58,7 @@ from opspace.tasks.motions import CenterOfMass, RelativeFrame, WorldFrame
 from opspace.tasks.posture import PostureTask
 from opspace.tasks.quantities import Orientation, Pose, Position
 from opspace.tasks.references import Sample
-from opspace.tasks.tracking import Hold
+from opspace.tasks.tracking import Hold, TrackingTask
 from opspace.tasks.way_round import WayRound
 
 QUANTITIES = {Position: POSITION, Orientation: ORIENTATION, Pose: POSE}
@@ -83,8 +83,6 @@ PACKED_ONCE = ("source", "quantity", "selection", "in_tool_axes", "layout", "row
 
 MOST_JOINTS = 4 * SIGNS
 """Joints of a task whose signs fit into what compiled code remembers of it."""
-
-SETTLED = (MotionTask.desired, PostureTask.desired)
 
 
 def kind_of(task: Task) -> int:
@@ -280,7 +278,7 @@ class Packed:
     def _pack_ahead(self) -> None:
         """Pack what is known before the tick, from any thread; `refresh` sees what changes later."""
         task = self.task
-        if self.own_kind or type(task).desired not in SETTLED:
+        if self.own_kind or type(task).desired is not TrackingTask.desired:
             return
         target, held = task._target, task._held
         goal = target.goal

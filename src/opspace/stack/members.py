@@ -38,6 +38,8 @@ class Variable:
 
     def value(self, t: float) -> float:
         """Evaluate it at time ``t`` [s]."""
+        if t >= self.end:
+            return self.target
         name, *numbers = self.ramp
         return ramp(t, PROFILES.index(name), *numbers)
 
@@ -192,6 +194,11 @@ def swap(a: Member, b: Member, duration: float, t: float, profile: str) -> None:
     arrival.send(1.0, duration, t, profile)
     a.places = (*a.places, Place(levels[1], arrival))
     b.places = (*b.places, Place(levels[0], arrival))
+
+
+def presences(members: Iterable[Member], t: float) -> list[float]:
+    """Evaluate at time ``t`` [s] how far each task is in its stack, 0 to 1."""
+    return [member.presence.value(t) for member in members]
 
 
 def variables_of(members: Iterable[Member]) -> tuple[Variable, ...]:
