@@ -58,6 +58,48 @@ def test_plans_made_ahead_give_the_same_to_the_last_bit(robot, steps):
     assert ahead == in_the_tick
 
 
+TWICE = {
+    "a move on from a move": (
+        lambda s, t: s.move(t[0], 0.5, 0.05),
+        lambda s, t: s.move(t[0], 2.0, 0.03, profile="tanh"),
+    ),
+    "a removal turned around": (
+        lambda s, t: s.remove(t[0], 0.05, profile="half-sine"),
+        lambda s, t: s.insert(t[0], 0.0, 0.02),
+    ),
+    "a hard switch on the way": (
+        lambda s, t: s.swap(t[0], t[6], 0.05),
+        lambda s, t: (s.remove(t[0], 0.0), s.insert(t[0], 3.0, 0.04)),
+    ),
+    "starts between two ticks": (
+        lambda s, t: s.insert(t[1], 0.5, 0.02),
+        lambda s, t: (
+            s.move(t[1], 4.0, 0.01, start_time=0.0127),
+            s.remove(t[1], start_time=0.0131),
+        ),
+    ),
+}
+
+
+@pytest.mark.parametrize("first", TWICE)
+@pytest.mark.parametrize("apart", [0, 1, 2, 7, 40])
+def test_what_is_foreseen_is_what_happens(robot, first, apart):
+    found = []
+    for kind in (Controller, InTheTick):
+        tasks = tasks_for(robot)
+        stack = Stack([tasks[0], tasks[6]])
+        controller = kind(robot.fresh(), stack)
+        controller.warm_up()
+        q, v = state(robot)
+        taus = []
+        for k in range(120):
+            for ask in [TWICE[first][0]] * (k == 2) + [TWICE[first][1]] * (k == 2 + apart):
+                ask(stack, tasks)
+            taus.append(controller.step(k * DT + 1e-4 * (k % 3), q, v).tau.tobytes())
+        found.append((taus, repr(stack)))
+    assert found[0] == found[1]
+
+
 def test_no_tick_lays_out_a_stack_that_could_be_foreseen(robot, monkeypatch):
     tasks = tasks_for(robot)
     stack = Stack([tasks[0], tasks[6]])

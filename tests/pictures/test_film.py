@@ -4,7 +4,6 @@ import dataclasses
 import subprocess
 import sys
 
-import mujoco
 import numpy as np
 import pytest
 from PIL import Image
@@ -12,29 +11,10 @@ from PIL import Image
 from opspace.errors import InputError, MissingExtraError
 from opspace.pictures.film import BAND, film
 from opspace.pictures.movie_file import write_mp4
-from opspace.pictures.offscreen import SnapshotUnavailableError, canvas
+from opspace.pictures.offscreen import SnapshotUnavailableError
 from opspace.robots import load_robot
-from tests.plots import synthetic
 
 SIZE = (120, 90)
-
-
-@pytest.fixture(scope="module")
-def run(tmp_path_factory):
-    directory = tmp_path_factory.mktemp("run") / "transition"
-    return synthetic.write_run(directory, "joint-limit", "transition", 0.05)
-
-
-@pytest.fixture(scope="module")
-def opengl():
-    try:
-        model = mujoco.MjModel.from_xml_string(
-            "<mujoco><worldbody><geom size='.1'/></worldbody></mujoco>"
-        )
-        with canvas(model, SIZE):
-            pass
-    except SnapshotUnavailableError as error:
-        pytest.skip(str(error))
 
 
 @pytest.mark.usefixtures("opengl")

@@ -3,7 +3,6 @@
 import subprocess
 import sys
 
-import mujoco
 import numpy as np
 import pytest
 from hypothesis import given
@@ -12,34 +11,14 @@ from hypothesis.extra import numpy as hnp
 from PIL import Image
 
 from opspace.errors import InputError, OpspaceError, UnknownNameError
-from opspace.pictures.offscreen import SnapshotUnavailableError, camera_axes, canvas, fit_view
+from opspace.pictures.offscreen import SnapshotUnavailableError, camera_axes, fit_view
 from opspace.pictures.snapshots import snapshot_strip, snapshots
 from opspace.robots import load_robot
-from tests.plots import inspection, synthetic
+from tests.plots import inspection
 
 SIZE = (120, 90)
 TIMES = (0.0, 2.0, 3.5)
 EMPTY = "<mujoco><worldbody><geom size='.1'/></worldbody></mujoco>"
-
-
-@pytest.fixture(scope="module")
-def robot():
-    return load_robot("puma560")
-
-
-@pytest.fixture(scope="module")
-def run(tmp_path_factory):
-    directory = tmp_path_factory.mktemp("run") / "transition"
-    return synthetic.write_run(directory, "joint-limit", "transition", 0.05)
-
-
-@pytest.fixture(scope="module")
-def opengl():
-    try:
-        with canvas(mujoco.MjModel.from_xml_string(EMPTY), SIZE):
-            pass
-    except SnapshotUnavailableError as error:
-        pytest.skip(str(error))
 
 
 @pytest.mark.usefixtures("opengl")

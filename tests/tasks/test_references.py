@@ -8,7 +8,7 @@ import sys
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from opspace.errors import InputError
@@ -213,7 +213,18 @@ def test_a_jerk_limited_motion_gets_another_goal_on_its_way_without_a_step(goal,
     np.testing.assert_array_equal(second(t + second.duration + 1e-9).x, other)
 
 
+@given(vectors, vectors, vectors, st.floats(1e-9, 1e-6))
+@example(np.zeros(3), np.array([0.0, 1.25, 0.0625]), np.zeros(3), 1e-7)
+def test_a_jerk_limited_motion_comes_to_its_goal_without_a_step(start, velocity, goal, before):
+    motion = JerkLimited(start, goal, **LIMITS, start_time=0.5, start_velocity=velocity)
+    x, v, a = motion(0.5 + motion.duration * (1.0 - before))
+    np.testing.assert_allclose(x, goal, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(v, 0.0, atol=1e-9)
+    np.testing.assert_allclose(a, 0.0, atol=1e-3)
+
+
 @given(vectors, vectors, vectors, vectors, st.floats(0.0, 1.0))
+@example(np.zeros(3), np.zeros(3), np.array([0.0, 1.25, 0.0625]), np.zeros(3), 1.0)
 def test_a_jerk_limited_turn_begins_as_told_and_has_true_rates(first, goal, omega, alpha, phase):
     R_start, R_goal = exp_rotation(first), exp_rotation(goal)
     turn = OrientationJerkLimited(

@@ -84,7 +84,9 @@ class Batch:
         """
         own = self._own_activations(Q, V, t)
         first = self._plans[0]
-        first.go_on_from(before, first.members)
+        known = () if before is None else before.variables
+        ramps = tuple(variable.ramp for variable in first.variables)
+        first.go_on(first.heritage(before, known, first.variables, ramps), first.members)
         self._refresh(t)
         given = {"Q": Q, "V": V, "own": own, "before": _remembered(first)}
         states = STATES.make({}, given)

@@ -35,18 +35,20 @@ from opspace.kernels.columns import (
 )
 from opspace.law import PROFILES
 from opspace.plan.entries import KERNELS
-from opspace.plan.plan import Plan, structure
+from opspace.plan.plan import Heritage, Plan, structure
 from opspace.plan.read_report import CompiledReport
 from opspace.robots.adapter import AdapterBase
 from opspace.robots.bodies import make_dynamics
 from opspace.robots.motion_axes import MotionAxes
 from opspace.robots.rigid_model import RigidModel
-from opspace.stack import Blending, Member
+from opspace.stack import Blending, Member, Outlook, variables_of
 from opspace.tasks.task import CHANGES
 from opspace.tasks.validation import finite, numbers
 
 STATUSES = tuple(map(Status, range(SOLVE)))
 NEW = tuple.__new__
+KEPT = 32
+"""Plans that are kept for stacks to come again."""
 TIME_JUMP, FAULT = int(Status.TIME_JUMP), int(Status.FAULT)
 
 _Fixed: TypeAlias = tuple[
@@ -82,8 +84,10 @@ class Controller(ReferenceController):
     _fixed: _Fixed | None = None
     _laid_out: _LaidOut | None = None
     _readable = False  # whether the tick before was the readable form's
-    # Plans laid out before they are needed, by structure: replaced as a whole, never changed.
+    # What is laid out before it is needed, replaced as a whole and never changed: plans by structure,
+    # and by the tasks (their identity, for which they are kept) how to take one up.
     _ready: Mapping[tuple[object, ...], Plan] = MappingProxyType({})
+    _ahead: Mapping[int, tuple[Heritage, _LaidOut]] = MappingProxyType({})
 
     def step(self, t: float, q: ArrayLike, v: ArrayLike) -> Command:
         """Compute the torque for one state; see `ReferenceController.step`."""
@@ -266,19 +270,50 @@ class Controller(ReferenceController):
             )
         return Batch(robot, self._bodies, members, self._planned, threads)
 
-    def _lay_out_ahead(self, to_come: Iterator[tuple[Member, ...]]) -> None:
+    def _lay_out_ahead(self, to_come: Iterator[Outlook]) -> None:
         """Make the plans that will be needed, so that a tick has only to take one up."""
         axes, known, now = self._axes, self._ready, self._plan
         assert axes is not None
         ready: dict[tuple[object, ...], Plan] = {} if now is None else {now.structure: now}
-        for members in to_come:
-            key = structure(members)
-            if key not in ready and Plan.fits(members):
-                ready[key] = known.get(key) or self._planned(members, axes)
-        self._ready = ready
+        ahead: dict[int, tuple[Heritage, _LaidOut]] = {}
+        before: Plan | None = None
+        last: Outlook | None = None
+        for outlook in to_come:
+            if last is not None and outlook.members is last.members:
+                continue
+            copies, plan = outlook.copies, None
+            if Plan.fits(copies):
+                key = structure(copies)
+                plan = ready.get(key) or known.get(key) or self._planned(copies, axes)
+                ready[key] = plan
+                if before is not None and last is not None:
+                    ramps = tuple(variable.ramp for variable in variables_of(copies))
+                    heritage = plan.heritage(before, last.variables, outlook.variables, ramps)
+                    ahead[id(outlook.members)] = heritage, _laid_out(outlook.members, plan)
+            before, last = plan, outlook
+        for key, plan in known.items():
+            if len(ready) < KEPT:
+                ready.setdefault(key, plan)
+        self._ready, self._ahead = ready, ahead
 
     def _lay_out(self, members: tuple[Member, ...]) -> _LaidOut | None:
         """Take up the plan for these tasks, or None where there are too many of them."""
+        found = self._ahead.get(id(members))
+        if found is None or not found[0].holds(self._plan):
+            found = self._laid_out_now(members)
+            if found is None:
+                return None
+        heritage, laid_out = found
+        plan = laid_out[1]
+        plan.go_on(heritage, members)
+        if self._readable:
+            plan.come_back(self._blending)
+            self._readable = False
+        self._plan, self._laid_out = plan, laid_out
+        return laid_out
+
+    def _laid_out_now(self, members: tuple[Member, ...]) -> tuple[Heritage, _LaidOut] | None:
+        """Lay out what was not foreseen, or what something else has come before."""
         assert self._axes is not None
         before, key = self._plan, structure(members)
         plan = before if before is not None and before.structure == key else self._ready.get(key)
@@ -286,15 +321,10 @@ class Controller(ReferenceController):
             if not Plan.fits(members):
                 return None
             plan = self._planned(members, self._axes)
-        plan.go_on_from(before, members)
-        if self._readable:
-            plan.come_back(self._blending)
-            self._readable = False
-        self._plan = plan
-        memory = plan.memory
-        address, torque = plan.handle.address, plan.tick.tau.copy
-        laid_out = self._laid_out = members, plan, address, torque, memory.tobytes
-        return laid_out
+        variables = variables_of(members)
+        known = () if before is None else before.variables
+        heritage = plan.heritage(before, known, variables, tuple(v.ramp for v in variables))
+        return heritage, _laid_out(members, plan)
 
     def _leave(self, members: tuple[Member, ...]) -> None:
         """Let the readable form go on from the compiled one."""
@@ -326,3 +356,8 @@ class Controller(ReferenceController):
         option[ROOM], option[REACH] = self._blending.room, self._blending.reach
         option[KEEP_TORQUE] = float(self.torque_limits == "priority")
         return option
+
+
+def _laid_out(members: tuple[Member, ...], plan: Plan) -> _LaidOut:
+    """Collect what every tick of these tasks needs."""
+    return members, plan, plan.handle.address, plan.tick.tau.copy, plan.memory.tobytes

@@ -45,8 +45,10 @@ def limit_terms(
     """
     beside = np.zeros(v.size) if disturbance is None else disturbance
     return [
-        LimitTerms(side, command - side.sign * float(beside[side.index]), limits.margin(side))
-        for side, command in zip(limits.sides, limits.commands(q, v), strict=True)
+        LimitTerms(side, command - side.sign * float(beside[side.index]), margin)
+        for side, command, margin in zip(
+            limits.sides, limits.commands(q, v), limits.margins(), strict=True
+        )
     ]
 
 

@@ -30,7 +30,7 @@ from opspace.law.blending import combined
 from opspace.law.scalars import SCALED
 from opspace.plan.scales import Scales
 from opspace.robots.protocol import Robot
-from opspace.stack import Blending, Member, Mixture, mixture
+from opspace.stack import Blending, Member, Mixture, mixture, presences
 from opspace.tasks import JointLimits, PostureTask, TaskTerms, TrackingTask
 from opspace.tasks.activations import own_activation
 
@@ -171,11 +171,11 @@ def tick(k: Given) -> Answer | None:
 def activations(k: Given) -> list[float]:
     """Presence in the stack times the task's own activation."""
     found: list[float] = []
-    for member in k.members:
-        h = member.presence.value(k.t)
+    for member, h in zip(k.members, presences(k.members, k.t), strict=True):
         if member.task.activation is not None:
-            h *= own_activation(member.task, k.robot, k.t)
-        found.append(h)
+            found.append(h * own_activation(member.task, k.robot, k.t))
+        else:
+            found.append(h)
     return found
 
 
@@ -212,6 +212,7 @@ def whiten_tasks(
     """
     members, rules = k.members, k.rules
     rank = {level: i for i, level in enumerate(mixed.levels)}
+    references = rules.scales.references([members[i].task for i, _ in mixed.slots])
     fade = h if rules.blending.fades_commands else [1.0] * len(h)
     sets = [
         TaskSet(
@@ -220,9 +221,9 @@ def whiten_tasks(
             rank[level],
             1.0,
             members[i].task.name,
-            rules.scales.reference(members[i].task),
+            reference,
         )
-        for i, level in mixed.slots
+        for (i, level), reference in zip(mixed.slots, references, strict=True)
     ]
     covered = any(
         isinstance(member.task, PostureTask) and member.task.rows == k.v.size and present == 1.0

@@ -169,9 +169,13 @@ class Ramp(NamedTuple):
         h = Profile(self.profile)(s)
         return Activation(h.value, h.slope * rate, h.curvature * rate**2 + h.slope * acceleration)
 
+    def starting(self, t: float) -> "Ramp":
+        """Build the same ramp that starts at time ``t`` [s]."""
+        return self if t == self.start_time else Ramp(self.profile, self.target, t, *self[3:])
+
     def finished(self, t: float) -> bool:
-        """Tell whether the ramp has arrived at its target at time ``t`` [s]."""
-        return t >= self.start_time + self.duration
+        """Tell whether the ramp is at its target at time ``t`` [s]; a hard switch always is."""
+        return self.duration == 0.0 or t >= self.start_time + self.duration
 
     @property
     def numbers(self) -> tuple[float, ...]:

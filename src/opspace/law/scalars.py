@@ -8,7 +8,7 @@ They may call one another and use numbers of this module, nothing else.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from types import MappingProxyType
 from typing import NamedTuple
 
@@ -175,6 +175,22 @@ RETURN_SPEED = 0.5
 ADMISSIBLE, BUFFER = range(2)
 
 
+class Approach(NamedTuple):
+    """How a joint moves towards one of its limits.
+
+    Attributes:
+        d: Distance, rad.
+        towards: Speed towards the limit, rad/s.
+        brake: Acceleration with which the joint can be counted on to brake, rad/s².
+        most: Largest speed, rad/s.
+    """
+
+    d: float
+    towards: float
+    brake: float
+    most: float
+
+
 class LimitLaw(NamedTuple):
     """How a joint limit acts.
 
@@ -189,6 +205,16 @@ class LimitLaw(NamedTuple):
     command: Callable[[float, float, float, float, float, float, float, float], float]
     presence: Callable[[float, float, float, float, int], float]
     bound: bool
+
+    def commands(
+        self, joints: Sequence[Approach], k1: float, k2: float, kp: float, buffer: float
+    ) -> list[float]:
+        """Evaluate the command of every limit."""
+        return [self.command(*joint, k1, k2, kp, buffer) for joint in joints]
+
+    def presences(self, joints: Sequence[Approach], buffer: float, code: int) -> list[float]:
+        """Evaluate the activation of every limit, with the profile of this code."""
+        return [self.presence(d, towards, brake, buffer, code) for d, towards, brake, _ in joints]
 
 
 def allowed_speed(d: float, brake: float, k1: float) -> tuple[float, float]:

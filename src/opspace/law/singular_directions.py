@@ -157,7 +157,9 @@ def solve_level_smoothly(
     U, s, Vt = np.linalg.svd(JN)
     sigma = s**2
     activation = np.array([buffer.activation(x) for x in sigma.tolist()])
-    response = np.array([buffer.response(x) for x in sigma.tolist()])
+    response = activation
+    if buffer.release is not None:
+        response = np.array([buffer.response(x) for x in sigma.tolist()])
     k = s.size
     strength = np.zeros(k)
     on = activation > 0.0

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from array import array
+from collections.abc import Iterable
 from inspect import isfunction
 from typing import Any
 
@@ -56,7 +58,7 @@ from opspace.tasks.motions import CenterOfMass, RelativeFrame, WorldFrame
 from opspace.tasks.posture import PostureTask
 from opspace.tasks.quantities import Orientation, Pose, Position
 from opspace.tasks.references import Sample
-from opspace.tasks.tracking import Hold
+from opspace.tasks.tracking import Hold, TrackingTask
 from opspace.tasks.way_round import WayRound
 
 QUANTITIES = {Position: POSITION, Orientation: ORIENTATION, Pose: POSE}
@@ -81,8 +83,6 @@ PACKED_ONCE = ("source", "quantity", "selection", "in_tool_axes", "layout", "row
 
 MOST_JOINTS = 4 * SIGNS
 """Joints of a task whose signs fit into what compiled code remembers of it."""
-
-SETTLED = (MotionTask.desired, PostureTask.desired)
 
 
 def kind_of(task: Task) -> int:
@@ -116,6 +116,12 @@ def _overrides(task: Task, built_in: type[Task]) -> bool:
     return bool(own - HONOURED)
 
 
+def _silent(task: Task) -> bool:
+    """Tell whether its class may decide anew at every tick what it has, or tells nobody of changes."""
+    kind = type(task)
+    return kind.activation is not None or kind.__setattr__ is not Task.__setattr__
+
+
 class Packed:
     """One task in the arrays of a plan.
 
@@ -131,7 +137,6 @@ class Packed:
         self, member: Member, index: int, first: int, axes: MotionAxes, tick: Record
     ) -> None:
         task = member.task
-        self.member = member
         self.task: Any = task
         self.index = index
         self.rows = slice(first, first + task.rows)
@@ -151,8 +156,8 @@ class Packed:
         kind[COVERS_ALL] = int(covers)
         tick.numbers[index] = np.zeros(NUMBERS_SIZE)
         # Which way round angles went, where there are any.
-        self.remembers = kind[REMEMBERS : REMEMBERS + 1]
-        self.turn = tick.numbers[index, TURN : TURN + 4]
+        self.remembers = kind[REMEMBERS : REMEMBERS + 1].data
+        self.turn = tick.numbers[index, TURN : TURN + 4].data
         self.way_round: WayRound | None = None
         self._turning = np.zeros(0)
         if kind[KIND] == MOTION:
@@ -196,10 +201,15 @@ class Packed:
             or task._gains is not self.gains
         ):
             self._pack(robot, t)
-        # A class may decide anew at every tick what its tasks have, or tell nobody of changes.
-        kind = type(task)
-        silent = kind.activation is not None or kind.__setattr__ is not Task.__setattr__
-        self.moving = self.own_kind or self._timed or self._own_activation or silent
+        self.moving = self.own_kind or self._timed or self._own_activation or _silent(task)
+
+    @property
+    def settled(self) -> bool:
+        """Whether all is packed that a tick would pack, until the task says that it has changed."""
+        task = self.task
+        if self.own_kind or task.activation is not None or _silent(task):
+            return False
+        return self.target is task._target and self.held is task._held and not self._timed
 
     def remember(self, before: Packed | None) -> None:
         """Go on from the same task in the plan before: which way round it went, and to where."""
@@ -207,8 +217,15 @@ class Packed:
             return  # none is remembered, or it is there already
         if before is None or before.way_round is None:
             self.remembers[0] = 0
-        else:
+        elif self._timed or before._timed or not self._agrees(before):
             self._go_on(before.remembers[0], before.turn, before._turning)
+        else:  # on the way to the same goal
+            self.remembers[0] = before.remembers[0]
+            self.turn[:] = before.turn
+
+    def _agrees(self, before: Packed) -> bool:
+        """Tell whether both have packed the same target."""
+        return self.target is before.target and self.held is before.held
 
     def leave(self) -> None:
         """Let the readable form go on with the way round, from the tick before."""
@@ -229,10 +246,10 @@ class Packed:
         """Take the short way at the next tick."""
         self.remembers[0] = 0
 
-    def _go_on(self, remembers: int, turn: Any, goal: np.ndarray) -> None:
+    def _go_on(self, remembers: int, turn: Iterable[float], goal: np.ndarray) -> None:
         """Take over the way round to a goal; whether the target is still there is seen at packing."""
         self.remembers[0] = remembers
-        self.turn[:] = turn
+        self.turn[:] = array("d", turn)
         self._turning[:] = goal
         self.target = None
 
@@ -240,13 +257,13 @@ class Packed:
         tick, rows = self._tick, self.rows
         robot.check_state(robot.q, robot.v)
         terms = self.task.evaluate(robot, t)
-        for given, array in (
+        for given, kept in (
             (terms.J, tick.J),
             (terms.drift, tick.drift),
             (terms.acceleration, tick.wanted),
             (terms.error, tick.error),
         ):
-            array[rows] = self._checked(given, array[rows].shape, t)
+            kept[rows] = self._checked(given, kept[rows].shape, t)
 
     def _checked(self, given: object, shape: tuple[int, ...], t: float) -> np.ndarray:
         found = np.asarray(given, dtype=float)
@@ -261,7 +278,7 @@ class Packed:
     def _pack_ahead(self) -> None:
         """Pack what is known before the tick, from any thread; `refresh` sees what changes later."""
         task = self.task
-        if self.own_kind or type(task).desired not in SETTLED:
+        if self.own_kind or type(task).desired is not TrackingTask.desired:
             return
         target, held = task._target, task._held
         goal = target.goal

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from struct import pack_into
+from struct import Struct
+from typing import NamedTuple
 
 import numpy as np
 
@@ -16,22 +17,55 @@ from opspace.kernels.columns import (
     LIMIT_LAW,
     LIMIT_PROFILE,
     LIMIT_WEIGHT,
+    VARIABLE_SIZE,
 )
 from opspace.kernels.limit_columns import DISTURBANCE, SIGN, SPEED
-from opspace.law import PROFILES
+from opspace.law import PROFILES, Ramp
 from opspace.law.scalars import NO_GROUP
 from opspace.machine.field_table import Record
+from opspace.machine.record import WORD
 from opspace.plan.memory import Sizes, make_tick
 from opspace.plan.pack_task import Packed
 from opspace.plan.scales import Scales
 from opspace.robots.adapter import AdapterBase
 from opspace.robots.motion_axes import MotionAxes
-from opspace.stack import Blending, Member, Variable
+from opspace.stack import Blending, Member, Variable, variables_of
 from opspace.tasks import JointLimits
 from opspace.tasks.task import CHANGES
 
 MOST = 62
 """Bits of a corner: more tasks, places or activations than this take the readable tick."""
+CODES = {name: float(code) for code, name in enumerate(PROFILES)}
+PACK = Struct(f"{VARIABLE_SIZE}d").pack
+ROW = VARIABLE_SIZE * WORD
+NOWHERE = np.array([NO_GROUP], np.int64).tobytes()
+"""The group of an activation that was not there."""
+
+
+class Heritage(NamedTuple):
+    """What a plan takes over from the one before it.
+
+    Attributes:
+        before: The plan before, which may be the same one; None if there was none.
+        known: The activations that it has then.
+        variables: Those after it.
+        groups: Where the group of each of them is remembered; None if all stay where they are.
+        turns: The tasks with angles, each with the same task in the plan before.
+        ramps: The ramps that the activations are expected to have.
+        packed: These as the plan's memory has them.
+    """
+
+    before: Plan | None
+    known: tuple[Variable, ...]
+    variables: tuple[Variable, ...]
+    groups: tuple[memoryview | bytes, ...] | None
+    turns: tuple[tuple[Packed, Packed | None], ...]
+    ramps: tuple[Ramp, ...]
+    packed: bytes
+
+    def holds(self, before: Plan | None) -> bool:
+        """Tell whether this plan is the one before, with the activations that were foreseen."""
+        return before is self.before and (before is None or before.variables == self.known)
 
 
 class Plan:
@@ -62,7 +96,7 @@ class Plan:
         self.axes = axes
         self.limits = limits
         self.n = axes.v.size
-        self.variables: list[Member | Variable] = [*members, *_arrivals(members)]
+        self.variables = variables_of(members)
         self.levels = sorted({place.level for m in members for place in m.places})
         self.places = sorted(
             ((p.level, i, k) for i, m in enumerate(members) for k, p in enumerate(m.places)),
@@ -80,11 +114,15 @@ class Plan:
             corners=blending.most_corners(len(self.variables)),
         )
         self.tick, self.memory = make_tick(self.size, axes, torque_limit, options)
-        self.seen: object = None
-        self.moving = False
+        last = CHANGES.last
         self.packed = self._pack(scales)
+        # Where everything is known ahead, the first tick need not look.
+        self.moving = False
+        self.seen: object = last if all(packed.settled for packed in self.packed) else None
+        # As bytes: arrays take several times as long to read and write them.
         self._ramps = self.tick.variable.reshape(-1).view(np.uint8).data
-        self._pack_variables()
+        self._groups = self.tick.group.view(np.uint8).data
+        self._ramps[:] = b"".join([_packed(variable.ramp) for variable in self.variables])
         self._pack_slots()
         self.first_kept = self.tick.space.first_kept
         depth, rows = self.tick.slots[:, 0], self.tick.slots[:, 2]
@@ -122,33 +160,61 @@ class Plan:
         tick = self.tick
         tick.limit[:, DISTURBANCE] = tick.limit[:, SIGN] * acceleration[tick.limit_joint]
 
-    def groups(self) -> dict[object, int]:
-        """Return the group of the blend that each activation is in."""
-        return dict(zip(self.variables, self.tick.group.tolist(), strict=True))
-
-    def go_on_from(self, before: Plan | None, members: tuple[Member, ...]) -> None:
-        """Take these tasks, of the same structure, and keep what the plan before remembers of them.
+    def heritage(
+        self,
+        before: Plan | None,
+        known: tuple[Variable, ...],
+        variables: tuple[Variable, ...],
+        ramps: tuple[Ramp, ...],
+    ) -> Heritage:
+        """Find what this plan is to take over, for these activations instead of the known ones.
 
         Args:
-            before: The plan before, which may be this one: groups of the blend, turns of rotations.
+            before: The plan before, which may be this one.
+            known: The activations that it has then.
+            variables: The activations that this one will have.
+            ramps: The ramps that they are expected to have.
+        """
+        packed = b"".join([_packed(ramp) for ramp in ramps])
+        if before is self and known == variables:
+            return Heritage(before, known, variables, None, (), ramps, packed)
+        place = {} if before is None else {variable: i for i, variable in enumerate(known)}
+        turns: list[tuple[Packed, Packed | None]] = []
+        for one, presence in zip(self.packed, variables, strict=False):
+            if one.way_round is not None:
+                i = place.get(presence)
+                turns.append((one, None if before is None or i is None else before.packed[i]))
+        groups = [
+            NOWHERE if before is None or (i := place.get(variable)) is None else before.group(i)
+            for variable in variables
+        ]
+        return Heritage(before, known, variables, tuple(groups), tuple(turns), ramps, packed)
+
+    def group(self, i: int) -> memoryview:
+        """Return the memory of the group that an activation is in."""
+        return self._groups[i * WORD : (i + 1) * WORD]
+
+    def go_on(self, heritage: Heritage, members: tuple[Member, ...]) -> None:
+        """Take these tasks, of the same structure, and keep what is remembered of them.
+
+        Args:
+            heritage: What that is: groups of the blend, turns of rotations.
             members: The tasks with their ramps.
         """
-        variables = [*members, *_arrivals(members)]
-        if before is not self or variables != self.variables:
-            self._take_over(before, members, variables)
-        self._pack_variables()
-
-    def _take_over(
-        self, before: Plan | None, members: tuple[Member, ...], variables: list[Member | Variable]
-    ) -> None:
-        groups = {} if before is None else before.groups()
-        known = {} if before is None else {p.member: p for p in before.packed}
-        self.members, self.variables = members, variables
-        self.tick.group[:] = [groups.get(v, NO_GROUP) for v in variables]
-        for packed, member in zip(self.packed, members, strict=True):
-            packed.member = member
-            packed.remember(known.get(member))
-        self.seen = None  # a target may have gone on meanwhile
+        self.members, self.variables = members, heritage.variables
+        if heritage.groups is not None:
+            self._groups[:] = b"".join(heritage.groups)
+            for packed, earlier in heritage.turns:
+                packed.remember(earlier)
+                if packed.target is None:
+                    self.seen = None
+        rows = self._ramps
+        rows[:] = heritage.packed
+        i = 0
+        for variable, ramp in zip(heritage.variables, heritage.ramps, strict=True):
+            if variable.ramp is not ramp:  # it started at another time than was expected
+                rows[i : i + ROW] = _packed(variable.ramp)
+            i += ROW
 
     def forget_ways(self) -> None:
         """Let all angles take the short way at the next tick."""
@@ -157,9 +223,9 @@ class Plan:
 
     def leave(self, members: Sequence[Member], blending: Blending) -> None:
         """Let the readable form go on with these tasks where this plan was at the tick before."""
-        blending.remember(self.groups())
-        for packed in self.packed:
-            if packed.member in members:
+        blending.remember(dict(zip(self.variables, self.tick.group.tolist(), strict=True)))
+        for packed, member in zip(self.packed, self.members, strict=True):
+            if member in members:
                 packed.leave()
 
     def come_back(self, blending: Blending) -> None:
@@ -180,14 +246,6 @@ class Plan:
             packed.append(entry)
         return packed
 
-    def _pack_variables(self) -> None:
-        rows: list[float] = []
-        for variable in self.variables:
-            ramp = (variable.presence if isinstance(variable, Member) else variable).ramp
-            rows += (PROFILES.index(ramp.profile), *ramp.numbers)
-        # As bytes: an array takes twice as long to read a list.
-        pack_into(f"{len(rows)}d", self._ramps, 0, *rows)
-
     def _pack_slots(self) -> None:
         tick = self.tick
         index = {id(v): i for i, v in enumerate(self.variables)}
@@ -203,6 +261,11 @@ class Plan:
             tick.slot_off[s] = sum({1 << index[id(arrival)] for arrival in later})
 
 
+def _packed(ramp: Ramp) -> bytes:
+    profile, *numbers = ramp
+    return PACK(CODES[profile], *numbers)
+
+
 def structure(members: Sequence[Member]) -> tuple[object, ...]:
     """Tell what a plan is laid out for: which tasks are at which levels, moved by how many ramps."""
     found: list[object] = []
@@ -212,16 +275,6 @@ def structure(members: Sequence[Member]) -> tuple[object, ...]:
         for place in member.places:
             found += (place.level, seen.setdefault(place.arrival, len(seen)))
     return tuple(found)
-
-
-def _arrivals(members: Sequence[Member]) -> list[Variable]:
-    """List the activations that move tasks between places, each once."""
-    found: dict[int, Variable] = {}
-    for member in members:
-        for place in member.places[1:]:  # the first place has none
-            assert place.arrival is not None
-            found.setdefault(id(place.arrival), place.arrival)
-    return list(found.values())
 
 
 def _pack_limits(limits: JointLimits, scales: Scales, tick: Record) -> None:

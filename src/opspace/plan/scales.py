@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import weakref
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -127,6 +128,10 @@ class Scales:
                 "controller, the last one that was built with it"
             )
         return found[1]
+
+    def references(self, tasks: Iterable[Task]) -> list[np.ndarray]:
+        """Return `reference` of every task."""
+        return [self.reference(task) for task in tasks]
 
     def calibration(self, tasks: list[Task]) -> Calibration:
         """Return the scales of the robot and of prepared tasks."""

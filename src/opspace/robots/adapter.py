@@ -29,6 +29,9 @@ class AdapterBase(ABC):
 
     _model: Any
     """What the library computes with; a copy of the robot has a copy of it."""
+    _M_view: np.ndarray
+    _bias_view: np.ndarray
+    """What is handed out as M and bias; ``_compute`` fills their memory."""
 
     def __init__(self, description: Description) -> None:
         """Take over names, limits and postures.
@@ -97,14 +100,16 @@ class AdapterBase(ABC):
         return self._v_view
 
     @property
-    @abstractmethod
     def M(self) -> np.ndarray:
-        """Return the joint-space inertia, (nv, nv)."""
+        """Return the joint-space inertia, (nv, nv), armature included."""
+        self.catch_up()
+        return self._M_view
 
     @property
-    @abstractmethod
     def bias(self) -> np.ndarray:
         """Return b + g, (nv,) N·m, springs included. Friction is not part of it."""
+        self.catch_up()
+        return self._bias_view
 
     @property
     def gravity(self) -> np.ndarray:

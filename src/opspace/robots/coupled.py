@@ -42,18 +42,6 @@ class CoupledRobot(AdapterBase):
         self._bias_view.setflags(write=False)
         self.update(self.q_reference, np.zeros(self.nv))
 
-    @property
-    def M(self) -> np.ndarray:
-        """Return the joint-space inertia, (nv, nv), armature included."""
-        self.catch_up()
-        return self._M_view
-
-    @property
-    def bias(self) -> np.ndarray:
-        """Return b + g, (nv,) N·m. Friction is not part of it."""
-        self.catch_up()
-        return self._bias_view
-
     def fresh(self) -> CoupledRobot:
         """Return the same robot with a state of its own; the model is shared."""
         return CoupledRobot(self.description, self._model.fresh())

@@ -47,18 +47,6 @@ class MujocoRobot(AdapterBase):
         self._world = WorldAxes(model, self._data)
         self.update(self.q_reference, np.zeros(self.nv))
 
-    @property
-    def M(self) -> np.ndarray:
-        """Return the joint-space inertia, (nv, nv), armature included."""
-        self.catch_up()
-        return self._M_view
-
-    @property
-    def bias(self) -> np.ndarray:
-        """Return b + g, (nv,) N·m. Friction is not part of it."""
-        self.catch_up()
-        return self._bias_view
-
     def fresh(self) -> MujocoRobot:
         """Return the same robot with a state of its own; the model is shared."""
         return MujocoRobot(self.description, self._model)

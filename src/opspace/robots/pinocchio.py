@@ -45,26 +45,14 @@ class PinocchioRobot(AdapterBase):
         self._to_pin = _quaternion_order(self.nq, description.quaternions, (1, 2, 3, 0))
         self._from_pin = _quaternion_order(self.nq, description.quaternions, (3, 0, 1, 2))
         # M is symmetric; the transpose of Eigen's column-major array is C-contiguous.
-        self._M = self._data.M.T
-        self._M.setflags(write=False)
-        self._bias = self._data.nle
-        self._bias.setflags(write=False)
+        self._M_view = self._data.M.T
+        self._M_view.setflags(write=False)
+        self._bias_view = self._data.nle
+        self._bias_view.setflags(write=False)
         self._writable_bias = self._data.nle
         self._accelerations_known = False
         self._placement = _contiguous_placements(self._data)
         self.update(self.q_reference, self._zero)
-
-    @property
-    def M(self) -> np.ndarray:
-        """Return the joint-space inertia, (nv, nv), armature included."""
-        self.catch_up()
-        return self._M
-
-    @property
-    def bias(self) -> np.ndarray:
-        """Return b + g, (nv,) N·m. Friction is not part of it."""
-        self.catch_up()
-        return self._bias
 
     def fresh(self) -> PinocchioRobot:
         """Return the same robot with a state of its own; the model is shared."""

@@ -107,7 +107,7 @@ class Insert(Request):
         member = members.get(self.task.name)
         if member is None or member.gone(t):
             presence = Variable(0.0, timing.profile)
-            member = members[self.task.name] = Member(self.task, presence, [Place(self.level)])
+            member = members[self.task.name] = Member(self.task, presence, (Place(self.level),))
         elif member.level != self.level:
             member.move(self.level, timing.duration, t, timing.profile)
         member.presence.send(1.0, timing.duration, t, timing.profile)

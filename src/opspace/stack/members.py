@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Iterable
+from dataclasses import dataclass
 from typing import NamedTuple
 
 from opspace.law import PROFILES, Ramp
@@ -26,12 +27,19 @@ class Variable:
         """Where it rests or goes, 0 or 1."""
         return self.ramp.target
 
+    @property
+    def end(self) -> float:
+        """When it has arrived or will arrive, s."""
+        return self.ramp.start_time + self.ramp.duration
+
     def arrived(self, t: float) -> bool:
         """Tell whether it rests at its target at time ``t`` [s]."""
-        return self.ramp.duration == 0.0 or self.ramp.finished(t)
+        return self.ramp.finished(t)
 
     def value(self, t: float) -> float:
         """Evaluate it at time ``t`` [s]."""
+        if t >= self.end:
+            return self.target
         name, *numbers = self.ramp
         return ramp(t, PROFILES.index(name), *numbers)
 
@@ -40,8 +48,8 @@ class Variable:
         self.ramp = self.ramp._replace(start_time=self.ramp.start_time + pause)
 
     def idle(self, t: float) -> bool:
-        """Tell whether it has had no effect up to time ``t`` [s] and may be forgotten."""
-        return self.value(t) == 0.0
+        """Tell whether it only begins at time ``t`` [s], has had no effect and may be forgotten."""
+        return t <= self.ramp.start_time and self.value(t) == 0.0
 
     def send(self, target: float, duration: float, t: float, profile: str) -> None:
         """Turn it towards 0 or 1 at time ``t`` [s], to arrive ``duration`` [s] later.
@@ -85,7 +93,7 @@ class Member:
 
     task: Task
     presence: Variable
-    places: list[Place] = field(default_factory=list[Place])
+    places: tuple[Place, ...]
 
     @property
     def leaving(self) -> bool:
@@ -124,8 +132,10 @@ class Member:
                 kept.append(place)
             elif place.arrival.target == 1.0:
                 kept = [Place(place.level)]
-        before, self.places = self.places, kept
-        return len(kept) < len(before)
+        if len(kept) == len(self.places):
+            return False
+        self.places = tuple(kept)
+        return True
 
     def move(self, level: float, duration: float, t: float, profile: str) -> None:
         """Send it to a level, back over its own steps where it has just come from there."""
@@ -133,11 +143,12 @@ class Member:
             if self.places[k].level == level and self._turn(k, duration, t, profile):
                 return
         # What has not begun yet, as of several requests between two ticks, need not begin.
-        while (last := self.places[-1].arrival) is not None and last.idle(t):
-            self.places.pop()
+        kept = self.places
+        while (last := kept[-1].arrival) is not None and last.idle(t):
+            kept = kept[:-1]
         arrival = Variable(0.0, profile)
         arrival.send(1.0, duration, t, profile)
-        self.places.append(Place(level, arrival))
+        self.places = (*kept, Place(level, arrival))
 
     def _turn(self, goal: int, duration: float, t: float, profile: str) -> bool:
         """Make a place the goal by turning variables, unless another task depends on them."""
@@ -181,5 +192,22 @@ def swap(a: Member, b: Member, duration: float, t: float, profile: str) -> None:
         return
     arrival = SharedVariable(0.0, profile)
     arrival.send(1.0, duration, t, profile)
-    a.places.append(Place(levels[1], arrival))
-    b.places.append(Place(levels[0], arrival))
+    a.places = (*a.places, Place(levels[1], arrival))
+    b.places = (*b.places, Place(levels[0], arrival))
+
+
+def presences(members: Iterable[Member], t: float) -> list[float]:
+    """Evaluate at time ``t`` [s] how far each task is in its stack, 0 to 1."""
+    return [member.presence.value(t) for member in members]
+
+
+def variables_of(members: Iterable[Member]) -> tuple[Variable, ...]:
+    """List the activations of tasks, each once: their presences, then their changes of place."""
+    members = tuple(members)
+    found = [member.presence for member in members]
+    for member in members:
+        for place in member.places[1:]:  # the first place has none
+            assert place.arrival is not None
+            if place.arrival not in found:
+                found.append(place.arrival)
+    return tuple(found)

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from opspace.law import Weighted
 from opspace.stack.groups import Blending
-from opspace.stack.members import Member, Variable
+from opspace.stack.members import Member, Variable, variables_of
 
 
 class Slot(NamedTuple):
@@ -62,15 +62,9 @@ def mixture(
     Returns:
         The stacks with weight > 0; those that are the same are one.
     """
-    values = list(activations)
-    variables: list[object] = list(members)
-    index: dict[Variable, int] = {}
-    for member in members:
-        for place in member.places:
-            if place.arrival is not None and place.arrival not in index:
-                index[place.arrival] = len(values)
-                values.append(place.arrival.value(t))
-                variables.append(place.arrival)
+    variables = variables_of(members)
+    values = [*activations, *(v.value(t) for v in variables[len(members) :])]
+    index = {variable: i for i, variable in enumerate(variables)}
     weights: dict[frozenset[Slot], float] = {}
     shares: list[dict[float, float]] = [{} for _ in members]
     for weight, on in blending.corners(variables, values):

@@ -15,6 +15,7 @@ from opspace.stack.changes import (
     checked_task,
 )
 from opspace.stack.members import Member
+from opspace.stack.rehearsal import Outlook
 from opspace.stack.transitions import Transitions
 from opspace.tasks import JointLimits, Task
 
@@ -265,12 +266,12 @@ class Stack:
         """
         self._transitions.attach(prepare)
 
-    def foresee(self, foresee: Callable[[Iterator[tuple[Member, ...]]], None]) -> None:
+    def foresee(self, foresee: Callable[[Iterator[Outlook]], None]) -> None:
         """Let a controller lay out what is to come, in the thread that asks for it.
 
         Args:
-            foresee: Called now and at every request with the tasks after each event to come; they
-                are copies, which hold only until it takes the next.
+            foresee: Called now and at every request with the tasks as they are, then after each
+                event to come. Ticks take up ready what it has looked at.
         """
         self._transitions.foresee(foresee)
 

@@ -4,39 +4,37 @@ from __future__ import annotations
 
 import math
 from bisect import insort
+from collections import deque
 from collections.abc import Callable, Iterator
-from copy import deepcopy
 from threading import Lock, RLock
-from typing import NamedTuple
 
 from opspace.errors import InputError, OpspaceError
 from opspace.stack.changes import Insert, Known, Request
+from opspace.stack.course import Course, Happening, Queued
 from opspace.stack.members import Member, Place, Variable
+from opspace.stack.rehearsal import Foreseen, Outlook, Rehearsal
 from opspace.tasks import Task
-
-AHEAD = 32
-"""Changes of the stack that are foreseen."""
-
-
-class _Queued(NamedTuple):
-    order: float
-    request: Request
 
 
 class Transitions:
     """The tasks of a stack and the requests that wait, safe to use from any thread.
 
-    The controller's thread changes tasks in `begin_tick`; every other one adds to the queue.
+    The controller's thread changes tasks in `begin_tick`; every other one adds to the queue. What
+    will come of a request is gone through on copies by the thread that asks; a tick in which that
+    happens has only to write it down.
     """
 
     def __init__(self) -> None:
-        self._members: dict[str, Member] = {}
-        self._queue: list[_Queued] = []
+        self._course = Course({}, [], ())
         self._now: float | None = None
         self._ticked: tuple[Member, ...] = ()
         self._prepare: Callable[[Task], None] | None = None
-        self._foresee: Callable[[Iterator[tuple[Member, ...]]], None] | None = None
-        self._period = 0.0
+        self._foresee: Callable[[Iterator[Outlook]], None] | None = None
+        # Outcomes of the events to come, good as long as no other one happens before.
+        self._coming: deque[Foreseen] = deque()
+        self._happened = 0
+        # The first of them, once it is sure to be the next thing to happen.
+        self._ripe: Foreseen | None = None
         # Nothing happens to the stack before this time, unless something new is asked.
         self._next = -math.inf
         self._asked = False
@@ -51,24 +49,24 @@ class Transitions:
         Raises:
             InputError: Another task has its name.
         """
-        if task.name in self._members:
+        if task.name in self._course.members:
             raise InputError(
                 f"two tasks are named {task.name!r}; give each a name of its own (name=...)"
             )
-        self._members[task.name] = Member(task, Variable(1.0), [Place(level)])
-        self._ticked = tuple(self._members.values())
+        self._course.members[task.name] = Member(task, Variable(1.0), (Place(level),))
+        self._ticked = tuple(self._course.members.values())
 
     def levels(self) -> list[tuple[float, Task]]:
         """List the tasks, each with the level where it is or goes."""
         with self._lock:
-            return [(member.level, member.task) for member in self._members.values()]
+            return [(member.level, member.task) for member in self._course.members.values()]
 
     def settled(self) -> bool:
         """Tell whether at the last tick nothing was on its way or due."""
         with self._lock:
             now = -math.inf if self._now is None else self._now
-            due = any(_is_due(queued.request, now) for queued in self._queue)
-            return not due and all(member.settled(now) for member in self._members.values())
+            due = any(queued.start <= now for queued in self._course.queue)
+            return not due and all(member.settled(now) for member in self._course.members.values())
 
     def present(self) -> tuple[Member, ...]:
         """Return the tasks of the last tick, or those there are at the start."""
@@ -91,24 +89,28 @@ class Transitions:
                 with self._lock:
                     self._checked(request)
                 self.prepare(request.task)
-            self._look_ahead(request)
+            coming, happened = self._look_ahead(request)
             with self._lock:
                 self._add(request)
-                self._asked = True
+                self._expect(coming, happened)
 
     def cancel(self) -> None:
         """Empty the queue."""
         with self._requesting:
             with self._lock:
-                self._queue.clear()
-                self._asked = True
-            self._look_ahead()
+                self._course.queue.clear()
+                self._course.look()
+                self._coming.clear()
+                self._ripe = None
+            coming, happened = self._look_ahead()
+            with self._lock:
+                self._expect(coming, happened)
 
     def prepare(self, task: Task) -> None:
         """Get a task ready that no tick is using."""
         with self._requesting:
             with self._lock:
-                used = [*(m.task for m in self._members.values()), *self._waiting()]
+                used = [*(m.task for m in self._course.members.values()), *self._waiting()]
             if self._prepare is not None and all(task is not one for one in used):
                 self._prepare(task)
 
@@ -116,16 +118,18 @@ class Transitions:
         """Prepare every task that is there or will be, and from now on every new one."""
         with self._requesting:
             with self._lock:
-                tasks = [*(m.task for m in self._members.values()), *self._waiting()]
+                tasks = [*(m.task for m in self._course.members.values()), *self._waiting()]
             for task in tasks:
                 prepare(task)
             self._prepare = prepare
 
-    def foresee(self, foresee: Callable[[Iterator[tuple[Member, ...]]], None]) -> None:
+    def foresee(self, foresee: Callable[[Iterator[Outlook]], None]) -> None:
         """Tell now, and before every request is queued, what stacks are to come."""
         with self._requesting:
             self._foresee = foresee
-            self._look_ahead()
+            coming, happened = self._look_ahead()
+            with self._lock:
+                self._expect(coming, happened)
 
     def begin_tick(self, t: float) -> tuple[Member, ...]:
         """Start what is due, and drop what has left.
@@ -148,11 +152,7 @@ class Transitions:
                 self._asked = False
                 if self._resuming:
                     self._resume(t)
-                elif self._now is not None:
-                    self._period = t - self._now
-                started = bool(self._queue) and self._start_due(t)
-                if self._settle(t) or started:
-                    self._change()
+                self._let_happen(t)
             finally:
                 self._lock.release()
         self._now = t
@@ -168,118 +168,108 @@ class Transitions:
         if self._now is None:
             return
         pause = t - self._now
-        variables = {id(v): v for m in self._members.values() for v in m.variables}
-        for variable in variables.values():
-            variable.wait(pause)
-        self._queue = [_Queued(q.order + pause, q.request.later(pause)) for q in self._queue]
+        self._course.wait(pause)
+        self._coming.clear()  # requests and ramps are others now
+        self._ripe = None
         self._now = t
-        self._ticked = tuple(self._members.values())  # another object: its ramps have changed
+        self._ticked = tuple(self._course.members.values())  # another object, for its ramps
         for member in self._ticked:
             member.task.resume(pause)
 
-    def _change(self) -> None:
-        members = tuple(self._members.values())
-        for member in members:
-            if member not in self._ticked:
-                member.task.reset()
-        self._ticked = members
-
-    def _look_ahead(self, request: Request | None = None) -> None:
-        """Go through what is to come on a copy, in the thread that asks."""
-        if self._foresee is None:
-            return
-        copy = Transitions()
-        with self._lock:
-            tasks = {id(member.task): member.task for member in self._members.values()}
-            copy._members = deepcopy(self._members, tasks)
-            copy._queue = list(self._queue)
-            copy._now, copy._period = self._now, self._period
-        if request is not None:
-            copy._add(request)
-        self._foresee(copy._to_come())
-
-    def _to_come(self) -> Iterator[tuple[Member, ...]]:
-        """Go from event to event; each answer holds until the next one is asked for."""
-        t = (self._now or 0.0) + self._period
-        for _ in range(AHEAD):
-            self._start_due(t)
-            self._settle(t)
-            yield tuple(self._members.values())
-            self._now, t = t, self._next
-            if t == math.inf:
+    def _let_happen(self, t: float) -> None:
+        """Go through the events until time ``t`` [s], as foreseen where they are."""
+        course, before = self._course, t if self._now is None else self._now
+        if self._ripe is not None and course.following <= t < self._ripe.following:
+            late = course.starts <= before
+            if not late or course.arrives > t:  # else what arrives until then comes first
+                self._happen(self._ripe, t if late else course.following)
+                self._ripe, self._asked = None, True  # what follows is looked for in the next tick
                 return
+        course.look()
+        at = -math.inf
+        while course.following <= t:
+            event = course.next_event(t, self._now, at)
+            at = event.time
+            if self._coming and self._coming[0].fits(event):
+                self._happen(self._coming[0], at)
+                course.look()
+            else:
+                self._play(event)
+        self._next = course.following
+        self._ripe = self._ripening(t)
 
-    def _start_due(self, t: float) -> bool:
-        before = self._now
-        start = -math.inf
-        waiting: list[_Queued] = []
-        for queued in self._queue:
-            request = queued.request
-            if not _is_due(request, t):
-                waiting.append(queued)
-                continue
-            wanted = request.timing.start_time
-            # Between two ticks it starts on time; what is in the past would be a step.
-            on_time = wanted is not None and before is not None and wanted > before
-            start = max(start, wanted if wanted is not None and on_time else t)
-            request.apply(self._members, start)
-        started = len(waiting) < len(self._queue)
-        self._queue = waiting
-        return started
+    def _happen(self, outcome: Foreseen, time: float) -> None:
+        """Do what was foreseen."""
+        self._happened += 1
+        self._coming.popleft()
+        outcome.happen(self._course, time)
+        self._ticked = outcome.present
+        for task in outcome.new:
+            task.reset()
 
-    def _settle(self, t: float) -> bool:
-        """Drop what has left, and find when the next request is due or the next ramp arrives.
+    def _play(self, event: Happening) -> None:
+        """Do what was not foreseen, after which nothing is any more."""
+        self._happened += 1
+        self._coming.clear()
+        before = self._ticked
+        if self._course.play(event):
+            self._ticked = tuple(self._course.members.values())
+        for member in self._ticked:
+            if member not in before:
+                member.task.reset()
 
-        One pass, for the tick that does it has other work to do.
+    def _ripening(self, t: float) -> Foreseen | None:
+        """Return the outcome of the next event after time ``t`` [s], if it was foreseen."""
+        course = self._course
+        if not self._coming or course.following == math.inf:
+            return None
+        event = course.next_event(max(course.following, math.nextafter(t, math.inf)), t, -math.inf)
+        return self._coming[0] if self._coming[0].fits(event) else None
+
+    def _look_ahead(self, request: Request | None = None) -> tuple[list[Foreseen], int]:
+        """Go through what is to come on a copy, in the thread that asks.
 
         Returns:
-            Whether a task or a place of one is gone.
+            The outcomes, and the number of events that had happened.
         """
-        gone: list[str] = []
-        tidied = False
-        following = math.inf
-        for name, member in self._members.items():
-            ramp = member.presence.ramp
-            end = ramp.start_time + ramp.duration
-            if t < end and ramp.duration != 0.0:
-                following = min(following, end)
-            elif ramp.target == 0.0:
-                gone.append(name)
-                continue
-            if len(member.places) > 1:
-                tidied = member.tidy(t) or tidied
-                for place in member.places[1:]:
-                    assert place.arrival is not None
-                    ramp = place.arrival.ramp
-                    following = min(following, ramp.start_time + ramp.duration)
-        for name in gone:
-            del self._members[name]
-        for queued in self._queue:
-            start = queued.request.timing.start_time
-            following = min(following, -math.inf if start is None else start)
-        self._next = following
-        return tidied or bool(gone)
+        if self._foresee is None:
+            return [], self._happened
+        with self._lock:
+            queue, happened = list(self._course.queue), self._happened
+            if request is not None:
+                insort(queue, self._checked(request), key=lambda queued: queued.order)
+            rehearsal = Rehearsal(self._course, queue, self._ticked, self._now)
+        self._foresee(rehearsal.outlooks())
+        return rehearsal.outcomes, happened
+
+    def _expect(self, coming: list[Foreseen], happened: int) -> None:
+        """Follow these outcomes, unless something else has happened meanwhile."""
+        self._coming = deque(coming if happened == self._happened else ())
+        self._course.look()
+        self._ripe = self._ripening(-math.inf if self._now is None else self._now)
+        self._asked = True
 
     def _waiting(self) -> list[Task]:
-        return [q.request.task for q in self._queue if isinstance(q.request, Insert)]
+        return [q.request.task for q in self._course.queue if isinstance(q.request, Insert)]
 
     def _add(self, request: Request) -> None:
-        insort(self._queue, self._checked(request), key=lambda queued: queued.order)
+        insort(self._course.queue, self._checked(request), key=lambda queued: queued.order)
 
-    def _checked(self, request: Request) -> _Queued:
+    def _checked(self, request: Request) -> Queued:
         """Go through everything that is asked, in the order in which it will happen."""
         known = {
             name: Known(member.task, member.level, member.leaving)
-            for name, member in self._members.items()
+            for name, member in self._course.members.items()
         }
         now = -math.inf if self._now is None else self._now
         wanted = request.timing.start_time
-        new = _Queued(now if wanted is None else max(wanted, now), request)
-        for queued in self._queue:
+        start = -math.inf if wanted is None else wanted
+        new = Queued(max(start, now), start, request)
+        for queued in self._course.queue:
             if queued.order <= new.order:
                 queued.request.check(known)
         request.check(known)
-        for queued in self._queue:
+        for queued in self._course.queue:
             if queued.order > new.order:
                 try:
                     queued.request.check(known)
@@ -288,8 +278,3 @@ class Transitions:
                         f"this makes a request for t = {queued.order:g} s impossible: {error}"
                     ) from None
         return new
-
-
-def _is_due(request: Request, t: float) -> bool:
-    wanted = request.timing.start_time
-    return wanted is None or wanted <= t

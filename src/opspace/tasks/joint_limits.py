@@ -12,7 +12,7 @@ import numpy as np
 
 from opspace.errors import InputError, unknown_name
 from opspace.law import PROFILES
-from opspace.law.scalars import LIMIT_LAWS, allowed_speed
+from opspace.law.scalars import LIMIT_LAWS, Approach, allowed_speed
 from opspace.tasks.known_attributes import KnownAttributes
 from opspace.tasks.validation import Array
 
@@ -212,13 +212,29 @@ class JointLimits(KnownAttributes):
 
     def commands(self, q: Array, v: Array) -> list[float]:
         """Evaluate `admissible` of every side at positions (n,) and velocities (n,)."""
-        positions, speeds = q.tolist(), v.tolist()
-        return [self.admissible(s, positions[s.index], speeds[s.index]) for s in self.sides]
+        if self.overridden:
+            return [self.admissible(s, float(q[s.index]), float(v[s.index])) for s in self.sides]
+        return self.law.commands(self._approaches(q, v), self.k1, self.k2, self.kp, self.buffer)
 
     def presences(self, q: Array, v: Array) -> list[float]:
         """Evaluate `presence` of every side at positions (n,) and velocities (n,)."""
+        if self.overridden:
+            return [self.presence(s, float(q[s.index]), float(v[s.index])) for s in self.sides]
+        code = PROFILES.index(self.profile)
+        return self.law.presences(self._approaches(q, v), self.buffer, code)
+
+    def margins(self) -> list[float]:
+        """Evaluate `margin` of every side."""
+        return [self.margin(side) for side in self.sides]
+
+    def _approaches(self, q: Array, v: Array) -> list[Approach]:
         positions, speeds = q.tolist(), v.tolist()
-        return [self.presence(s, positions[s.index], speeds[s.index]) for s in self.sides]
+        return [
+            Approach(
+                s.sign * (s.limit - positions[s.index]), s.sign * speeds[s.index], s.brake, s.speed
+            )
+            for s in self.sides
+        ]
 
     def allowed_speed(self, side: Side, distance: float) -> float:
         """Speed towards a limit from which the joint still stops at it, v_adm(d), rad/s or m/s."""

@@ -84,10 +84,9 @@ class MotionTask(TrackingTask):
 
     def evaluate(self, robot: Robot, t: float) -> TaskTerms:
         """Return the terms of the task at the robot's present state."""
-        self._require_bound(robot)
+        desired = self.asked(robot, t)
         quantity, block = self.quantity, self.quantity.block
         motion = self.source.measure(robot)
-        desired = self.pushed(self.desired(robot, t))
         error = quantity.error(motion, desired.x)
         basis, drift = self.selection, motion.drift[block]
         if self.in_tool_axes:
@@ -104,9 +103,35 @@ class MotionTask(TrackingTask):
             desired=desired,
         )
 
-    def desired(self, robot: Robot, t: float) -> Sample:
-        """See `TrackingTask.desired`."""
-        return self._desired(t, lambda: self.quantity.value(self.source.measure(robot)))
+    def _terms(
+        self,
+        basis: Array,
+        *,
+        J: Array,
+        drift: Array,
+        velocity: Array,
+        error: Array,
+        desired: Sample,
+    ) -> TaskTerms:
+        """Project the motion of k coordinates on the m task rows and apply Eq. 24 there.
+
+        Args:
+            basis: (m, k) rows of the task in the coordinates of the other arguments.
+            J: (k, n) Jacobian.
+            drift: (k,) J̇ v.
+            velocity: (k,) J v.
+            error: (k,) x_d − x.
+            desired: Desired motion; only its velocity and acceleration (k,) are read.
+        """
+        error = basis @ error
+        return TaskTerms(
+            J=basis @ J,
+            drift=basis @ drift,
+            acceleration=self._gains.acceleration(
+                error, basis @ (desired.v - velocity), basis @ desired.a
+            ),
+            error=error,
+        )
 
     def row_axes(self, robot: Robot) -> Array | None:
         """See `Task.row_axes`; None for what is seen from another frame."""
@@ -124,6 +149,9 @@ class MotionTask(TrackingTask):
         """Forget the held start value and which way round a rotation error went."""
         super().reset()
         self.quantity.reset()
+
+    def _current(self, robot: Robot) -> Array:
+        return self.quantity.value(self.source.measure(robot))
 
     def _resolve(self, robot: Robot) -> None:
         self.source.bind(robot)

@@ -87,11 +87,10 @@ class PostureTask(TrackingTask):
 
     def evaluate(self, robot: Robot, t: float) -> TaskTerms:
         """Return the terms of the task at the robot's present state."""
-        self._require_bound(robot)
+        desired = self.asked(robot, t)
         layout = self.layout
         assert layout is not None  # bound
         q = robot.q
-        desired = self.pushed(self.desired(robot, t))
         q_desired = q.copy()
         q_desired[layout.entries] = desired.x
         error = robot.difference(q, q_desired)[layout.coordinates]
@@ -111,11 +110,10 @@ class PostureTask(TrackingTask):
         super().reset()
         self.turn.reset()
 
-    def desired(self, robot: Robot, t: float) -> Sample:
-        """See `TrackingTask.desired`."""
+    def _current(self, robot: Robot) -> Array:
         layout = self.layout
         assert layout is not None  # bound
-        return self._desired(t, lambda: robot.q[layout.entries])
+        return robot.q[layout.entries]
 
     def _resolve(self, robot: Robot) -> None:
         layout = joint_layout(robot, self._joints)

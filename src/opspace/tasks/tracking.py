@@ -15,7 +15,7 @@ from opspace.tasks.gains import one_or_all, paced
 from opspace.tasks.references.sample import Constant, Reference, Sample
 from opspace.tasks.references.start import begun
 from opspace.tasks.rotation import quaternion_from_matrix
-from opspace.tasks.task import Task, TaskTerms
+from opspace.tasks.task import Task
 from opspace.tasks.validation import Array, brief, finite_array, positive, shown
 from opspace.tasks.ways import Pace, VectorWay, Way
 
@@ -79,8 +79,9 @@ class TrackingTask(Task):
     """Base class of tasks with a target.
 
     Subclasses say what a target value looks like (``_check_value``), look up names (``_resolve``),
-    compute their terms (``evaluate``) and, where a value is no vector, how one is approached
-    (``_way``). ``motion_size`` is k, the length of desired velocities, None while it is not known.
+    compute their terms (``evaluate``) and value (``_current``) and, where that is no vector, how one
+    is approached (``_way``). ``motion_size`` is k, the length of desired velocities, None while it is
+    not known.
     """
 
     def __init__(
@@ -138,7 +139,9 @@ class TrackingTask(Task):
 
     def reset(self) -> None:
         """Forget the held start value, the integral, and where a way has come to."""
-        self._held = self._led = self._before = self._integral = None
+        memory = self._held, self._led, self._before, self._integral
+        if any(part is not None for part in memory):  # else nothing changes, and no tick need look
+            self._held = self._led = self._before = self._integral = None
 
     @property
     def ki(self) -> float | None:
@@ -275,7 +278,16 @@ class TrackingTask(Task):
             self._vector(acceleration, f"task {self.name!r}: target acceleration"),
         )
 
-    @abstractmethod
+    def asked(self, robot: Robot, t: float) -> Sample:
+        """Return what the task asks for at time ``t`` [s]: what is desired, pushed by the integral.
+
+        Raises:
+            InputError: Not bound to this robot, or a reference that gave unusable numbers.
+        """
+        if robot is not self._robot:
+            raise InputError(f"task {self.name!r} is not bound to this robot: call bind(robot)")
+        return self.pushed(self.desired(robot, t))
+
     def desired(self, robot: Robot, t: float) -> Sample:
         """Return what the task follows at time ``t`` [s]; without a target, what it finds now.
 
@@ -289,6 +301,11 @@ class TrackingTask(Task):
         Raises:
             InputError: A reference that gave unusable numbers.
         """
+        return self._desired(t, lambda: self._current(robot))
+
+    @abstractmethod
+    def _current(self, robot: Robot) -> Array:
+        """Return the value that the robot has now, in the task's own form."""
 
     @abstractmethod
     def _resolve(self, robot: Robot) -> None:
@@ -383,36 +400,6 @@ class TrackingTask(Task):
             self._vector(sample[2] if np.size(sample[2]) else None, f"{what} a"),
         )
 
-    def _terms(
-        self,
-        basis: Array,
-        *,
-        J: Array,
-        drift: Array,
-        velocity: Array,
-        error: Array,
-        desired: Sample,
-    ) -> TaskTerms:
-        """Project the motion of k coordinates on the m task rows and apply Eq. 24 there.
-
-        Args:
-            basis: (m, k) rows of the task in the coordinates of the other arguments.
-            J: (k, n) Jacobian.
-            drift: (k,) J̇ v.
-            velocity: (k,) J v.
-            error: (k,) x_d − x.
-            desired: Desired motion; only its velocity and acceleration (k,) are read.
-        """
-        error = basis @ error
-        return TaskTerms(
-            J=basis @ J,
-            drift=basis @ drift,
-            acceleration=self._gains.acceleration(
-                error, basis @ (desired.v - velocity), basis @ desired.a
-            ),
-            error=error,
-        )
-
     def _words(self) -> list[str]:
         goal = self._target.goal
         if isinstance(goal, np.ndarray):
@@ -423,10 +410,6 @@ class TrackingTask(Task):
         return [
             "target=what it finds" if isinstance(goal, Hold) else f"target={type(goal).__name__}"
         ]
-
-    def _require_bound(self, robot: Robot) -> None:
-        if robot is not self._robot:
-            raise InputError(f"task {self.name!r} is not bound to this robot: call bind(robot)")
 
     def _goal(self, value: ArrayLike | None) -> Array | Hold:
         return Hold() if value is None else self._check_value(value, f"task {self.name!r}: target")

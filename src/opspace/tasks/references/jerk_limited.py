@@ -8,9 +8,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from opspace.errors import InputError
+from opspace.tasks.references.phase import minimum_jerk_phase
 from opspace.tasks.references.sample import Sample
 from opspace.tasks.references.start import Started, optional_time
 from opspace.tasks.validation import Array, finite_array
+
+ROUNDING = 1e-12
+"""Part of a unit by which a motion may end beside its goal: it is no step, and on a way as short as this
+there is no jerk to make good for it."""
 
 
 class JerkLimited(Started):
@@ -72,6 +77,9 @@ class JerkLimited(Started):
         self._trajectory = Trajectory(size)
         _calculate(motion, self._trajectory, size)
         self.duration: float = self._trajectory.duration
+        # The plan ends beside the goal by up to 1e-8, which would be a step there.
+        beside = self.goal - np.array(self._trajectory.at_time(self.duration)[0])
+        self._beside = np.where(np.abs(beside) > ROUNDING, beside, 0.0)
 
     def __call__(self, t: float, /) -> Sample:
         """Return the desired motion at time t, s."""
@@ -82,8 +90,12 @@ class JerkLimited(Started):
             return self._first
         if elapsed >= self.duration:
             return Sample(self.goal, self._rest, self._rest)
-        x, v, a = self._trajectory.at_time(elapsed)
-        return Sample(np.array(x), np.array(v), np.array(a))
+        planned = zip(
+            self._trajectory.at_time(elapsed),
+            minimum_jerk_phase(elapsed, 0.0, self.duration),
+            strict=True,
+        )
+        return Sample(*(np.array(part) + share * self._beside for part, share in planned))
 
 
 def _calculate(motion: Any, trajectory: Any, size: int) -> None:
