@@ -49,7 +49,7 @@ def _robot(controller: ReferenceController) -> dict[str, Any]:
         (upper if side.sign > 0 else lower)[side.index] = side.limit
     return {
         "name": robot.name,
-        "file": None if _has_name(robot) else str(robot.source),
+        "file": None if _has_name(robot) or robot.source is None else str(robot.source),
         "floating_base": robot.floating_base,
         "locked_joints": dict(held_joints(robot)),
         "tool": robot.tool,

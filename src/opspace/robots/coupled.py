@@ -120,8 +120,8 @@ def coupled_description(description: Description) -> Description:
     """
     if description.nq != description.nv:
         raise ModelError(
-            f"{description.source}: joints that follow others beside joints with several "
-            "coordinates are not supported; lock them"
+            f"{description.source or description.name}: joints that follow others beside joints "
+            "with several coordinates are not supported; lock them"
         )
     spread = Spread.of(description.joint_names, description.couplings)
     leaders = spread.leaders
@@ -138,8 +138,8 @@ def coupled_description(description: Description) -> Description:
     for name, k in place.items():
         if limits["q_lower"][k] >= limits["q_upper"][k]:
             raise ModelError(
-                f"{description.source}: no position of joint {name!r} keeps the joints that "
-                "follow it within their limits; lock it"
+                f"{description.source or description.name}: no position of joint {name!r} keeps the "
+                "joints that follow it within their limits; lock it"
             )
     q = np.clip(description.q_reference[leaders], limits["q_lower"], limits["q_upper"])
     names = description.joint_names

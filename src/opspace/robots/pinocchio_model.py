@@ -44,7 +44,9 @@ def model_from_urdf(urdf: Urdf, floating_base: bool) -> Any:
         fixed = pin.buildModelFromXML(to_xml(urdf, inertias=True, prefix="joint "))
     except (ValueError, RuntimeError) as error:
         reason = " ".join(str(error).split())
-        raise ModelError(f"{urdf.path}: Pinocchio cannot use it: {reason}") from None
+        raise ModelError(f"{urdf.origin}: Pinocchio cannot use it: {reason}") from None
+    for own in urdf.moving_joints:
+        fixed.armature[fixed.joints[fixed.getJointId(f"joint {own.name}")].idx_v] = own.armature
     if not floating_base:
         return fixed
     base = pin.Model()
