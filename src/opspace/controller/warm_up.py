@@ -22,6 +22,7 @@ from opspace.plan.records import REMEMBERED
 from opspace.robots.bodies import RIGID_BODIES, make_dynamics
 from opspace.robots.joint_kinds import ALIGNED
 from opspace.robots.motion_axes import MotionAxes
+from opspace.robots.payload import Masses
 from opspace.robots.rigid_model import RigidModel
 
 log = logging.getLogger("opspace")
@@ -69,7 +70,9 @@ def first_batch() -> list[tuple[Any, tuple[Any, ...]]]:
     """Return what is called to have the tick for many states compiled."""
     bodies = _one_body()
     state = np.zeros((1, 1))
-    axes = RigidModel(bodies, {}, ()).motion_axes(make_dynamics(bodies), np.zeros(1), np.zeros(1))
+    axes = RigidModel(bodies, {}, Masses((), {})).motion_axes(
+        make_dynamics(bodies), np.zeros(1), np.zeros(1)
+    )
     before = REMEMBERED.make({"variables": 0, "tasks": 0}).handle()
     smallest = _smallest(axes)
     return [(ticks, (0.0, smallest, before, state, state, np.ones((1, 0)), 0, 1, state.copy()))]
@@ -122,7 +125,7 @@ def _axes() -> MotionAxes:
         placement=np.zeros((1, 12)),
         parent=np.array([-1]),
         frames={},
-        masses=(),
+        masses=Masses((), {}),
     )
 
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from opspace.controller import ReferenceController
-from opspace.robots.adapter import held_joints
+from opspace.robots.adapter import added_frames, held_joints
 from opspace.robots.catalogue import CATALOGUE, locate
 from opspace.robots.joint_units import joint_units
 from opspace.robots.protocol import Robot
@@ -52,6 +52,7 @@ def _robot(controller: ReferenceController) -> dict[str, Any]:
         "file": None if _has_name(robot) or robot.source is None else str(robot.source),
         "floating_base": robot.floating_base,
         "locked_joints": dict(held_joints(robot)),
+        "frames": added_frames(robot),
         "tool": robot.tool,
         "gravity": controller.gravity,
         "joints": list(robot.joint_names),

@@ -35,34 +35,17 @@ class CoupledRobot(AdapterBase):
         self._model = model
         self.spread = self._all = Spread.of(model.joint_names, description.couplings)
         self._G = self._all.G
-        self._ids = {name: model.frame_id(name) for name in self.frame_names}
-        self._M, self._bias = np.zeros((self.nv, self.nv)), np.zeros(self.nv)
-        self._M_view, self._bias_view = self._M.view(), self._bias.view()
-        self._M_view.setflags(write=False)
-        self._bias_view.setflags(write=False)
+        self._hold(np.zeros((self.nv, self.nv)), np.zeros(self.nv))
         self.update(self.q_reference, np.zeros(self.nv))
 
-    @property
-    def M(self) -> np.ndarray:
-        """Return the joint-space inertia, (nv, nv), armature included."""
-        self.catch_up()
-        return self._M_view
-
-    @property
-    def bias(self) -> np.ndarray:
-        """Return b + g, (nv,) N·m. Friction is not part of it."""
-        self.catch_up()
-        return self._bias_view
-
-    def fresh(self) -> CoupledRobot:
-        """Return the same robot with a state of its own; the model is shared."""
+    def _fresh(self) -> CoupledRobot:
         return CoupledRobot(self.description, self._model.fresh())
 
-    def motion_axes(self) -> MotionAxes | None:
+    def _motion_axes(self) -> MotionAxes | None:
         """Return None: one coordinate moves several joints."""
         return None
 
-    def rigid_model(self) -> RigidModel | None:
+    def _rigid_model(self) -> RigidModel | None:
         """Return None: one coordinate moves several joints."""
         return None
 
@@ -79,6 +62,9 @@ class CoupledRobot(AdapterBase):
         model.update(self._all.positions(self._q), G @ self._v)
         self._M[:] = G.T @ model.M @ G
         self._bias[:] = G.T @ model.bias
+
+    def _links(self) -> tuple[float, np.ndarray]:
+        return self._model._links()
 
     def _gravity(self, _: int) -> np.ndarray:
         return self._G.T @ self._model.gravity

@@ -14,7 +14,6 @@ from opspace.errors import ModelError, missing_extra
 from opspace.robots.adapter import AdapterBase
 from opspace.robots.description import Description
 from opspace.robots.joint_roles import ALL_WITH_A_MOTOR, JointChoice
-from opspace.robots.protocol import Robot
 from opspace.robots.urdf import Urdf, describe_urdf, read_urdf
 
 if TYPE_CHECKING:
@@ -33,7 +32,7 @@ class RobotFile:
     """
 
     description: Description
-    build: Callable[[Description], Robot]
+    build: Callable[[Description], AdapterBase]
 
 
 def read_robot(

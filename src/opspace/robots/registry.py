@@ -12,12 +12,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from opspace.errors import ModelError, ModelWarning, missing_extra, unknown_name
+from opspace.robots.adapter import AdapterBase
 from opspace.robots.catalogue import CATALOGUE, SHIPPED, CatalogueEntry, locate
 from opspace.robots.description import Description
 from opspace.robots.from_memory import is_model, read_model
 from opspace.robots.joint_roles import JointChoice
 from opspace.robots.loading import SUFFIXES, RobotFile, read_robot
-from opspace.robots.protocol import Robot
 
 if TYPE_CHECKING:
     import mujoco
@@ -75,7 +75,7 @@ def load_robot(
     locked: Collection[str] | Mapping[str, float] = (),
     tool: str | None = None,
     reference: ArrayLike | Mapping[str, float] | None = None,
-) -> Robot:
+) -> AdapterBase:
     """Load a robot by name, from a URDF or MJCF file, or from a model in memory.
 
     The robot has the joints that are controlled. What carries the others is held fixed; joints
@@ -161,7 +161,7 @@ def _chosen(
     return replace(description, q_reference=q)
 
 
-def _built(file: RobotFile, description: Description) -> Robot:
+def _built(file: RobotFile, description: Description) -> AdapterBase:
     for sentence in description.warnings:
         warn(f"{description.name}: {sentence}", ModelWarning, stacklevel=3)
     return file.build(description)

@@ -25,10 +25,10 @@ def world_axes(cdof, origins, com, axes):
 
 
 @compile_and_keep
-def placements(first, xmat, xpos, placement):
-    """Write rotations (by columns) and positions into the rows from ``first`` on."""
+def placements(xmat, xpos, placement):
+    """Write rotations (by columns) and positions into the rows."""
     for i in range(xpos.shape[0]):
         for column in range(3):
             for row in range(3):
-                placement[first + i, 3 * column + row] = xmat[i, 3 * row + column]
-            placement[first + i, 9 + column] = xpos[i, column]
+                placement[i, 3 * column + row] = xmat[i, 3 * row + column]
+            placement[i, 9 + column] = xpos[i, column]
