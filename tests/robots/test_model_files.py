@@ -302,5 +302,5 @@ def test_every_robot_of_example_robot_data(path: Path) -> None:
     assert weak or np.abs(robot.position(robot.tool) - start).max() < 1e-3
     if weak:
         assert any("torque is above the limit" in sentence for sentence in report.warnings)
-    with pytest.raises(OpspaceError, match="not fully actuated|cannot float|lock them"):
+    with pytest.raises(OpspaceError, match=r"not fully actuated|cannot float|lock them"):
         osc.Controller(load_robot(path, floating_base=True), osc.Stack([osc.PostureTask()]))
