@@ -17,6 +17,7 @@ import pinocchio as pin
 from opspace.errors import ModelError
 from opspace.robots.description import Description, Origin, unused
 from opspace.robots.joint_roles import JointChoice
+from opspace.robots.pinocchio_model import inertia_on_world
 from opspace.robots.urdf import MOMENTS, Urdf, describe_urdf, limit_warnings, reduce_urdf
 from opspace.robots.urdf_pose import matrix_rpy
 
@@ -156,15 +157,11 @@ class _Tree:
 
     def inertia(self, link: _Link) -> Any:
         """Return what a link weighs; a joint's own link carries all that is fixed to it."""
-        total = pin.Inertia.Zero()
         if link is not self.own[link.joint]:
-            return total
+            return pin.Inertia.Zero()
         if link.joint > 0:
             return self._model.inertias[link.joint]
-        for frame in self._model.frames:
-            if frame.parentJoint == 0:
-                total += frame.placement.act(frame.inertia)
-        return total
+        return inertia_on_world(self._model)
 
 
 def _write_link(root: ET.Element, name: str, inertia: Any) -> None:
