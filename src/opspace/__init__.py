@@ -46,6 +46,7 @@ if TYPE_CHECKING:
     from opspace.record.observer import TickRecorder as TickRecorder
     from opspace.record.replay import Replay as Replay
     from opspace.record.replay import replay as replay
+    from opspace.robots import Payload as Payload
     from opspace.robots import Robot as Robot
     from opspace.robots import RobotInfo as RobotInfo
     from opspace.robots import available_robots as available_robots
@@ -96,7 +97,7 @@ _NAMES = {
     "opspace.record.black_box": "BlackBox",
     "opspace.record.observer": "TickRecorder",
     "opspace.record.replay": "Replay replay",
-    "opspace.robots": "Robot RobotInfo available_robots load_robot",
+    "opspace.robots": "Payload Robot RobotInfo available_robots load_robot",
     "opspace.loop": "AnyPlant Observer Outcome Stepping StopRule simulate",
     "opspace.plan.calibration": "Calibration",
     "opspace.plan.scales": "Singularity",

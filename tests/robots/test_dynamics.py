@@ -43,11 +43,12 @@ def assert_same(robot: Robot, seed: int, fast: float = 1.0) -> None:
             J[:, j] = [*(linear + np.cross(angular, origin)), *angular]
             j = int(model.bodies.before[j])
         assert_close(J, robot.jacobian(frame))
-    total = sum(m.mass for m in model.masses)
+    links = list(zip(model.masses.place[:, 0], model.masses.points, strict=True))
+    total = sum(point[0] for _, point in links)
     centre = sum(
-        m.mass * (found.placement[m.body, :9].reshape(3, 3).T @ m.centre)
-        + m.mass * found.placement[m.body, 9:]
-        for m in model.masses
+        point[0] * (found.placement[body, :9].reshape(3, 3).T @ point[1:])
+        + point[0] * found.placement[body, 9:]
+        for body, point in links
     )
     assert_close(centre / total, robot.com_position())
 

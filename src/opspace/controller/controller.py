@@ -89,7 +89,7 @@ class Controller(ReferenceController):
     _ready: Mapping[tuple[object, ...], Plan] = MappingProxyType({})
     _ahead: Mapping[int, tuple[Heritage, _LaidOut]] = MappingProxyType({})
 
-    def step(self, t: float, q: ArrayLike, v: ArrayLike) -> Command:
+    def step(self, t: float, q: ArrayLike, v: ArrayLike) -> Command:  # noqa: PLR0912 - one piece is fast
         """Compute the torque for one state; see `ReferenceController.step`."""
         fixed = self._fixed
         if fixed is None:
@@ -100,6 +100,8 @@ class Controller(ReferenceController):
         robot, place, catch_up, watch, begin_tick, observer, tick = fixed
         if type(t) is not float or not isfinite(t):
             t = finite(t, "time")
+        if self._loading is not None:
+            self._load(t)
         try:
             place(q, v)
         except (TypeError, ValueError):

@@ -13,12 +13,15 @@ from opspace.controller.disturbance import DisturbanceObserver
 from opspace.controller.drivable import check_drivable
 from opspace.controller.handover import Handover
 from opspace.controller.integral import IntegralAction
+from opspace.controller.loading import Loading
 from opspace.controller.rates import check_damping, check_limits, with_period
 from opspace.controller.stages import Given, Law, Rules, sum_of_hard_torques, tick
 from opspace.controller.watchdog import Watchdog
 from opspace.errors import InputError, unknown_name
 from opspace.law import Profile
 from opspace.plan.scales import DEFAULT_SINGULARITY, Scales, Singularity
+from opspace.robots.adapter import AdapterBase
+from opspace.robots.payload import Payload
 from opspace.robots.protocol import Robot
 from opspace.stack import Blending, Member, Stack
 from opspace.tasks import JointLimits, Task, TrackingTask
@@ -126,6 +129,7 @@ class ReferenceController:
         if stack.limits is not None:
             stack.limits.bind(robot, self.calibration.brake)
         self._handover: Handover | None = None
+        self._loading: Loading | None = None
         self._plain = not self._robot_adds and self._integral is None
         self._observer = _observer(stack.limits, robot.nv, torque_limits)
         self._rules = Rules(
@@ -179,6 +183,34 @@ class ReferenceController:
         self._begin(Handover(self._joint_torque(tau), duration, back=False))
         self.restart()
 
+    def carry(self, payload: Payload | None, duration: float = 0.5) -> None:
+        """Take a payload into the model, or out of it, without a step in the torque.
+
+        Inertia, Coriolis and gravity torque and the centre of mass move with it, from the next tick
+        on; called again before that has ended, they go on from where they are. ``robot.payload``
+        is the payload from the first tick on. From any thread, between two ticks.
+
+        Args:
+            payload: What the robot carries in the end; None is nothing.
+            duration: How long it takes, s; 0 is at once.
+
+        Raises:
+            InputError: The robot cannot carry it, or is not one of ``load_robot``.
+            UnknownNameError: The robot has no frame of the payload's.
+        """
+        robot = self.robot
+        if not isinstance(robot, AdapterBase):
+            raise InputError(
+                f"robot {robot.name!r} is not one of load_robot: what it carries is in its own model"
+            )
+        self._loading = Loading(robot, payload, duration)
+
+    def _load(self, t: float) -> None:
+        """Let a payload come or go on."""
+        loading = self._loading
+        if loading is not None and loading.tick(t) and self._loading is loading:
+            self._loading = None
+
     def restart(self) -> None:
         """Go on at the next tick as if no time had passed since the last, wherever the robot is now.
 
@@ -196,6 +228,8 @@ class ReferenceController:
         """Let the next tick depend on nothing that the robot did before it."""
         if self._observer is not None:
             self._observer.forget_last()
+        if self._loading is not None:
+            self._loading.resume()
         self.stack.resume()
 
     def hand_back(self, tau: ArrayLike, duration: float = 0.5) -> None:
@@ -275,6 +309,8 @@ class ReferenceController:
         """
         t = finite(t, "time")
         robot = self.robot
+        if self._loading is not None:
+            self._load(t)
         robot.update(numbers(q, "q"), numbers(v, "v"))
         timing = Status.OK if self._timing is None else self._timing.check(t, robot.q, robot.v)
         if timing & Status.TIME_JUMP and self._holds:

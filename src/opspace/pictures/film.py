@@ -24,8 +24,8 @@ SIZES = {".gif": (360, 320), ".mp4": (720, 640)}
 """Size of the robot's picture by ending of the file: a GIF grows large."""
 FPS = {".gif": 10.0, ".mp4": 30.0}
 """Pictures per second by ending of the file."""
-SHADOWS = 2048
-"""Side of the map of the shadows: a quarter of a snapshot's takes half the time, and moves."""
+NO_SHADOWS = 0
+"""Size of the map of the shadows: without a graphics card they take more than half of the time."""
 BAND = 130
 """Width of the band with the activations beside a picture of the height of a GIF's, pixels."""
 
@@ -78,7 +78,7 @@ def film(
     times = np.arange(t[0], t[-1], speed / fps).tolist() or [float(t[0])]
 
     def frames() -> Iterator[Image.Image]:
-        images = render(recording, robot, times, size=size, task=task, shadow_map=SHADOWS)
+        images = render(recording, robot, times, size=size, task=task, shadow_map=NO_SHADOWS)
         for done, (image, time) in enumerate(zip(images, times, strict=True), 1):
             row = min(int(np.searchsorted(t, time)), len(t) - 1)
             yield _captioned(image, time, recording.row(row))

@@ -110,8 +110,8 @@ def render(
         size: See `snapshots`.
         task: See `snapshots`.
         direction: See `snapshots`.
-        shadow_map: Side of the map that shadows are read from, pixels; without a graphics card most
-            of the time goes into it.
+        shadow_map: Side of the map that shadows are read from, pixels; 0 is no shadows. Without a
+            graphics card they take most of the time.
 
     Yields:
         (height, width, 3) uint8 image for each time.

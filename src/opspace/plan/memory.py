@@ -92,8 +92,8 @@ def make_tick(
     given = {
         **{name: getattr(axes, name) for name in ("q", "v", "M", "bias", "axes", "placement")},
         "parent": np.array(axes.parent, np.int64),
-        "mass_place": np.array([[m.body, m.joint] for m in axes.masses], np.int64).reshape(-1, 2),
-        "mass": np.array([[m.mass, *m.centre] for m in axes.masses]).reshape(-1, 4),
+        "mass_place": axes.masses.place,
+        "mass": axes.masses.points,
         "torque_limit": limit,
         "option": option,
         "inertia": inertia,

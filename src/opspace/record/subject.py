@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from opspace.controller import ReferenceController
-from opspace.robots.adapter import held_joints
+from opspace.robots.adapter import added_frames, held_joints
 from opspace.robots.catalogue import CATALOGUE, locate
 from opspace.robots.joint_units import joint_units
 from opspace.robots.protocol import Robot
@@ -49,9 +49,10 @@ def _robot(controller: ReferenceController) -> dict[str, Any]:
         (upper if side.sign > 0 else lower)[side.index] = side.limit
     return {
         "name": robot.name,
-        "file": None if _has_name(robot) else str(robot.source),
+        "file": None if _has_name(robot) or robot.source is None else str(robot.source),
         "floating_base": robot.floating_base,
         "locked_joints": dict(held_joints(robot)),
+        "frames": added_frames(robot),
         "tool": robot.tool,
         "gravity": controller.gravity,
         "joints": list(robot.joint_names),

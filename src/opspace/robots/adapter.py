@@ -5,7 +5,9 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
+from weakref import ref
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,6 +15,8 @@ from numpy.typing import ArrayLike
 from opspace.errors import InputError, unknown_name
 from opspace.robots.description import Description
 from opspace.robots.motion_axes import MotionAxes
+from opspace.robots.payload import Masses, Payload, moved, tensor_of
+from opspace.robots.placement import AddedFrame, FramePlaces, FrameTable, as_placement, skew
 from opspace.robots.spread import Spread
 
 if TYPE_CHECKING:
@@ -46,7 +50,6 @@ class AdapterBase(ABC):
         self.nv = description.nv
         self.joint_names = description.joint_names
         self.joint_units = description.joint_units
-        self.frame_names = description.frame_names
         self.tool = description.tool
         self.q_reference = _frozen(description.q_reference)
         self.configurations: Mapping[str, np.ndarray] = {
@@ -60,7 +63,7 @@ class AdapterBase(ABC):
         self.floating_base = description.floating_base
         self.locked_joints = tuple(description.locked)
         self.spread: Spread | None = None
-        self._ids = {name: i for i, name in enumerate(self.frame_names)}
+        self._table = FrameTable(description.frame_names)
         self._q = np.array(description.q_reference, dtype=float)
         self._v = np.zeros(self.nv)
         self._q_view = _view(self._q)
@@ -69,6 +72,9 @@ class AdapterBase(ABC):
         self._q_memory, self._v_memory = self._q.data, self._v.data
         self._cache: dict[tuple[str, int | str], np.ndarray] = {}
         self._behind = False
+        self._payload: Payload | None = None
+        self._loads: dict[int, np.ndarray] = {}
+        self._read: list[ref[Masses]] = []
 
     def __repr__(self) -> str:
         names = (
@@ -84,10 +90,21 @@ class AdapterBase(ABC):
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Be copied as model and state; the memory that compiled code reads stays behind."""
-        return type(self), (self.description, self._model), (self.q.copy(), self.v.copy())
+        given = self.tool, self._table, self._payload, self._loads
+        return type(self), self._parts(), (given, self.q.copy(), self.v.copy())
 
-    def __setstate__(self, state: tuple[np.ndarray, np.ndarray]) -> None:
-        self.update(*state)
+    def _parts(self) -> tuple[Any, ...]:
+        """Return what it was made of."""
+        return self.description, self._model
+
+    def __setstate__(self, state: tuple[tuple[Any, ...], np.ndarray, np.ndarray]) -> None:
+        (self.tool, self._table, self._payload, self._loads), q, v = state
+        self.update(q, v)
+
+    @property
+    def frame_names(self) -> tuple[str, ...]:
+        """Return the names of all frames; the index is the frame's id."""
+        return self._table.names
 
     @property
     def q(self) -> np.ndarray:
@@ -98,6 +115,11 @@ class AdapterBase(ABC):
     def v(self) -> np.ndarray:
         """Return the velocity of the last update, (nv,)."""
         return self._v_view
+
+    def _hold(self, M: np.ndarray, bias: np.ndarray) -> None:
+        """Keep the memory in which `_compute` leaves inertia and bias."""
+        self._M, self._bias = M, bias
+        self._M_view, self._bias_view = _view(M), _view(bias)
 
     @property
     def M(self) -> np.ndarray:
@@ -114,7 +136,95 @@ class AdapterBase(ABC):
     @property
     def gravity(self) -> np.ndarray:
         """Return the gravity torque g, (nv,) N·m, without weight that is carried for the robot."""
-        return self._cached("gravity", 0, self._gravity)
+        return self._cached("gravity", 0, self._loaded_gravity)
+
+    @property
+    def added_frames(self) -> Mapping[int, AddedFrame]:
+        """Return the frames that are not the model's own, by id."""
+        return self._table.added
+
+    def add_frame(
+        self, name: str, parent: str | None = None, placement: ArrayLike = (0.0, 0.0, 0.0)
+    ) -> int:
+        """Add a frame of one's own, for tasks, as a tool or to carry a payload.
+
+        It is there for every controller of this robot, also for those that are built already.
+
+        Args:
+            name: A name that no frame has yet.
+            parent: The frame that it is fixed to; None is the robot's tool.
+            placement: Where it is there: (3,) position, m; (7,) position and quaternion
+                [x y z, qw qx qy qz]; or a (4, 4) homogeneous matrix.
+
+        Returns:
+            Its id.
+
+        Raises:
+            InputError: The name is taken, or the placement is none.
+            UnknownNameError: No frame is called ``parent``.
+        """
+        if not isinstance(name, str) or not name:
+            raise InputError(f"a frame needs a name, not {name!r}")
+        if name in self._table.ids:
+            raise InputError(
+                f"{self.name} has a frame {name!r} already; give this one another name"
+            )
+        before = self.frame_id(self.tool if parent is None else parent)
+        where = f"the placement of frame {name!r}"
+        return self._table.add(name, AddedFrame(before, *as_placement(placement, where)))
+
+    @property
+    def payload(self) -> Payload | None:
+        """What the robot carries beside its links; set it to change the model at once.
+
+        `opspace.Controller.carry` changes it without a step in the torque.
+        """
+        return self._payload
+
+    @payload.setter
+    def payload(self, payload: Payload | None) -> None:
+        self.carry(payload, self.loads_of(payload))
+
+    @property
+    def loads(self) -> Mapping[int, np.ndarray]:
+        """Return what the frames carry at the moment, by their ids; see `payload.load`."""
+        return self._loads
+
+    def loads_of(self, payload: Payload | None) -> dict[int, np.ndarray]:
+        """Return what the frames carry with a payload.
+
+        Raises:
+            InputError: It is no `Payload`, or hangs on a frame that does not move.
+            UnknownNameError: No frame has the name of its frame.
+        """
+        if payload is None:
+            return {}
+        if not isinstance(payload, Payload):
+            raise InputError(f"a robot carries a Payload or None, not a {type(payload).__name__}")
+        name = self.tool if payload.frame is None else payload.frame
+        frame, numbers = self.frame_id(name), payload.load
+        if not np.any(self.jacobian(frame)):
+            raise InputError(f"frame {name!r} of {self.name} does not move and carries no payload")
+        added = self._table.added.get(frame)
+        if added is not None:
+            frame, numbers = added.parent, moved(numbers, added.rotation, added.position)
+        return {frame: numbers}
+
+    def carry(self, payload: Payload | None, loads: Mapping[int, np.ndarray]) -> None:
+        """Change what the frames carry, for compiled code that reads this robot as well.
+
+        Args:
+            payload: What `payload` answers from now on.
+            loads: What the frames carry by their ids, (10,) each; it may be on its way to that.
+        """
+        self._payload, self._loads = payload, dict(loads)
+        self._read = [reference for reference in self._read if reference() is not None]
+        for reference in self._read:
+            masses = reference()
+            if masses is not None:
+                masses.carry(self._loads)
+        self._cache.clear()
+        self._behind = True
 
     def update(self, q: np.ndarray, v: np.ndarray) -> None:
         """Set the state and compute what every query needs.
@@ -133,8 +243,8 @@ class AdapterBase(ABC):
         for i in self.description.quaternions:
             self._q[i : i + 4] /= math.sqrt(q[i : i + 4] @ q[i : i + 4])
         self._cache.clear()
-        self._behind = False
-        self._compute()
+        self._behind = True
+        self.catch_up()
 
     def place(self, q: ArrayLike, v: ArrayLike) -> None:
         """Set a state whose numbers are checked elsewhere; the dynamics follow when somebody asks.
@@ -159,6 +269,40 @@ class AdapterBase(ABC):
         if self._behind:
             self._behind = False
             self._compute()
+            for frame, numbers in self._loads.items():
+                self._add_load(frame, numbers)
+
+    def _add_load(self, frame: int, numbers: np.ndarray) -> None:
+        """Add what a frame carries: M += Jᵀ I J, bias += Jᵀ (I (J̇ v − g) + ω × I ω)."""
+        J, drift = self.jacobian(frame), self.drift(frame).copy()
+        drift[:3] -= self._links()[1]
+        self._M += J.T @ self._load_inertia(frame, numbers) @ J
+        self._bias += J.T @ self._load_force(frame, numbers, drift)
+
+    def _load_inertia(self, frame: int, numbers: np.ndarray) -> np.ndarray:
+        """Return the inertia (6, 6) of a load in world axes, about the frame's origin."""
+        R = self.rotation(frame)
+        H, inertia = skew(R @ numbers[1:4]), np.zeros((6, 6))
+        inertia[:3, :3] = numbers[0] * np.eye(3)
+        inertia[:3, 3:], inertia[3:, :3] = -H, H
+        inertia[3:, 3:] = R @ tensor_of(numbers) @ R.T
+        return inertia
+
+    def _load_force(self, frame: int, numbers: np.ndarray, acceleration: np.ndarray) -> np.ndarray:
+        """Return force and moment (6,) that take a load along, at an acceleration (6,) of its frame."""
+        inertia = self._load_inertia(frame, numbers)
+        spin = skew(self.velocity(frame)[3:])
+        force = inertia @ acceleration
+        force[:3] += spin @ spin @ self.rotation(frame) @ numbers[1:4]
+        force[3:] += spin @ inertia[3:, 3:] @ self.velocity(frame)[3:]
+        return force
+
+    def _loaded_gravity(self, _: int) -> np.ndarray:
+        g, up = self._gravity(0), np.zeros(6)
+        up[:3] = -self._links()[1]
+        for frame, numbers in self._loads.items():
+            g = g + self.jacobian(frame).T @ self._load_inertia(frame, numbers) @ up
+        return g
 
     @property
     def state(self) -> tuple[np.ndarray, np.ndarray]:
@@ -178,21 +322,21 @@ class AdapterBase(ABC):
             UnknownNameError: No frame has this name.
         """
         try:
-            return self._ids[name]
+            return self._table.ids[name]
         except KeyError:
             raise unknown_name(f"frame of {self.name}", name, self.frame_names) from None
 
     def position(self, frame: int | str) -> np.ndarray:
         """Return the frame's origin in world axes, (3,) m."""
-        return self._cached("position", frame, self._position)
+        return self._cached("position", frame, self._position, self._added_position)
 
     def rotation(self, frame: int | str) -> np.ndarray:
         """Return R_world_frame, (3, 3)."""
-        return self._cached("rotation", frame, self._rotation)
+        return self._cached("rotation", frame, self._rotation, self._added_rotation)
 
     def jacobian(self, frame: int | str) -> np.ndarray:
         """Return J of the frame's origin in world axes, (6, nv), linear rows first."""
-        return self._cached("jacobian", frame, self._jacobian)
+        return self._cached("jacobian", frame, self._jacobian, self._added_jacobian)
 
     def velocity(self, frame: int | str) -> np.ndarray:
         """Return J v, (6,) m/s and rad/s."""
@@ -200,31 +344,111 @@ class AdapterBase(ABC):
 
     def drift(self, frame: int | str) -> np.ndarray:
         """Return Jdot v, (6,) m/s² and rad/s²."""
-        return self._cached("drift", frame, self._drift)
+        return self._cached("drift", frame, self._drift, self._added_drift)
+
+    def _added_position(self, added: AddedFrame) -> np.ndarray:
+        return self.position(added.parent) + self._arm(added)
+
+    def _added_rotation(self, added: AddedFrame) -> np.ndarray:
+        return self.rotation(added.parent) @ added.rotation
+
+    def _added_jacobian(self, added: AddedFrame) -> np.ndarray:
+        J = self.jacobian(added.parent).copy()
+        J[:3] -= skew(self._arm(added)) @ J[3:]
+        return J
+
+    def _added_drift(self, added: AddedFrame) -> np.ndarray:
+        r, spin = self._arm(added), skew(self.velocity(added.parent)[3:])
+        drift = self.drift(added.parent).copy()
+        drift[:3] += spin @ spin @ r - skew(r) @ drift[3:]
+        return drift
+
+    def _arm(self, added: AddedFrame) -> np.ndarray:
+        """Return the way from the parent's origin to the frame's in world axes, (3,) m."""
+        return self.rotation(added.parent) @ added.position
 
     def com_position(self) -> np.ndarray:
-        """Return the centre of mass of the moving links, (3,) m."""
-        return self._cached("com", 0, self._com)
+        """Return the centre of mass of the moving links and of what they carry, (3,) m."""
+        return self._cached("com", 0, self._loaded_com)
 
     def com_jacobian(self) -> np.ndarray:
         """Return the Jacobian of the centre of mass, (3, nv)."""
-        return self._cached("com_jacobian", 0, self._com_jacobian)
+        return self._cached("com_jacobian", 0, self._loaded_com_jacobian)
 
     def com_drift(self) -> np.ndarray:
         """Return Jdot v of the centre of mass, (3,) m/s²."""
-        return self._cached("com_drift", 0, self._com_drift)
+        return self._cached("com_drift", 0, self._loaded_com_drift)
 
-    @abstractmethod
+    def _loaded_com(self, _: int) -> np.ndarray:
+        return self._with_loads(
+            self._com(0),
+            lambda f, x: x[0] * self.position(f) + self.rotation(f) @ x[1:4],
+        )
+
+    def _loaded_com_jacobian(self, _: int) -> np.ndarray:
+        return self._with_loads(
+            self._com_jacobian(0),
+            lambda f, x: self._load_inertia(f, x)[:3] @ self.jacobian(f),
+        )
+
+    def _loaded_com_drift(self, _: int) -> np.ndarray:
+        return self._with_loads(
+            self._com_drift(0),
+            lambda f, x: self._load_force(f, x, self.drift(f))[:3],
+        )
+
+    def _with_loads(
+        self, links: np.ndarray, carried: Callable[[int, np.ndarray], np.ndarray]
+    ) -> np.ndarray:
+        """Average something over the mass of the links and of what they carry."""
+        if not self._loads:
+            return links
+        mass, _ = self._links()
+        total = mass * links
+        for frame, numbers in self._loads.items():
+            total = total + carried(frame, numbers)
+            mass += numbers[0]
+        return total / mass
+
     def fresh(self) -> AdapterBase:
         """Return the same robot with a state of its own; the model is shared."""
+        copy = self._fresh()
+        copy.tool, copy._table = self.tool, self._table
+        copy._payload, copy._loads = self._payload, dict(self._loads)
+        copy._behind = bool(self._loads)
+        return copy
 
-    @abstractmethod
     def motion_axes(self) -> MotionAxes | None:
         """Return the arrays that compiled code reads, or None if a joint has several coordinates."""
+        found = self._motion_axes()
+        return None if found is None else replace(found, frames=self._followed(found))
 
-    @abstractmethod
     def rigid_model(self) -> RigidModel | None:
         """Return the bodies as numbers, or None if there is a joint that they cannot describe."""
+        found = self._rigid_model()
+        return None if found is None else replace(found, frames=self._followed(found))
+
+    def _followed(self, found: MotionAxes | RigidModel) -> FramePlaces:
+        """Let numbers that somebody else reads follow the payload and the frames that are added."""
+        found.masses.carry(self._loads)
+        self._read.append(ref(found.masses))
+        return FramePlaces(found.frames, self._table.added)
+
+    @abstractmethod
+    def _fresh(self) -> AdapterBase:
+        """Return a robot of the same model, as it was loaded."""
+
+    @abstractmethod
+    def _motion_axes(self) -> MotionAxes | None:
+        """Return the arrays of the model as it was loaded; see `motion_axes`."""
+
+    @abstractmethod
+    def _rigid_model(self) -> RigidModel | None:
+        """Return the bodies of the model as it was loaded; see `rigid_model`."""
+
+    @abstractmethod
+    def _links(self) -> tuple[float, np.ndarray]:
+        """Return the mass of the moving links, kg, and gravity (3,), m/s²."""
 
     @abstractmethod
     def integrate(self, q: np.ndarray, v: np.ndarray, dt: float) -> np.ndarray:
@@ -263,14 +487,19 @@ class AdapterBase(ABC):
     def _com_drift(self, _: int) -> np.ndarray: ...
 
     def _cached(
-        self, what: str, frame: int | str, compute: Callable[[int], np.ndarray]
+        self,
+        what: str,
+        frame: int | str,
+        compute: Callable[[int], np.ndarray],
+        of_added: Callable[[AddedFrame], np.ndarray] | None = None,
     ) -> np.ndarray:
         key = (what, frame)
         value = self._cache.get(key)
         if value is None:
             frame = self._known(frame)
             self.catch_up()
-            value = compute(frame)
+            added = self._table.added.get(frame) if of_added is not None else None
+            value = compute(frame) if of_added is None or added is None else of_added(added)
             value.setflags(write=False)
             self._cache[key] = value
         return value
@@ -345,3 +574,15 @@ def held_joints(robot: Robot) -> Mapping[str, float | None]:
 def spread_of(robot: Robot) -> Spread | None:
     """Tell how the joints of the file follow those of the robot; None where none follows."""
     return robot.spread if isinstance(robot, AdapterBase) else None
+
+
+def added_frames(robot: Robot) -> dict[str, dict[str, Any]]:
+    """Tell which frames a robot was given, by name: parent, and placement as (4, 4) lists."""
+    if not isinstance(robot, AdapterBase):
+        return {}
+    names, found = robot.frame_names, {}
+    for frame, added in robot.added_frames.items():
+        T = np.eye(4)
+        T[:3, :3], T[:3, 3] = added.rotation, added.position
+        found[names[frame]] = {"parent": names[added.parent], "placement": T.tolist()}
+    return found

@@ -35,22 +35,17 @@ class CoupledRobot(AdapterBase):
         self._model = model
         self.spread = self._all = Spread.of(model.joint_names, description.couplings)
         self._G = self._all.G
-        self._ids = {name: model.frame_id(name) for name in self.frame_names}
-        self._M, self._bias = np.zeros((self.nv, self.nv)), np.zeros(self.nv)
-        self._M_view, self._bias_view = self._M.view(), self._bias.view()
-        self._M_view.setflags(write=False)
-        self._bias_view.setflags(write=False)
+        self._hold(np.zeros((self.nv, self.nv)), np.zeros(self.nv))
         self.update(self.q_reference, np.zeros(self.nv))
 
-    def fresh(self) -> CoupledRobot:
-        """Return the same robot with a state of its own; the model is shared."""
+    def _fresh(self) -> CoupledRobot:
         return CoupledRobot(self.description, self._model.fresh())
 
-    def motion_axes(self) -> MotionAxes | None:
+    def _motion_axes(self) -> MotionAxes | None:
         """Return None: one coordinate moves several joints."""
         return None
 
-    def rigid_model(self) -> RigidModel | None:
+    def _rigid_model(self) -> RigidModel | None:
         """Return None: one coordinate moves several joints."""
         return None
 
@@ -67,6 +62,9 @@ class CoupledRobot(AdapterBase):
         model.update(self._all.positions(self._q), G @ self._v)
         self._M[:] = G.T @ model.M @ G
         self._bias[:] = G.T @ model.bias
+
+    def _links(self) -> tuple[float, np.ndarray]:
+        return self._model._links()
 
     def _gravity(self, _: int) -> np.ndarray:
         return self._G.T @ self._model.gravity
@@ -108,8 +106,8 @@ def coupled_description(description: Description) -> Description:
     """
     if description.nq != description.nv:
         raise ModelError(
-            f"{description.source}: joints that follow others beside joints with several "
-            "coordinates are not supported; lock them"
+            f"{description.source or description.name}: joints that follow others beside joints "
+            "with several coordinates are not supported; lock them"
         )
     spread = Spread.of(description.joint_names, description.couplings)
     leaders = spread.leaders
@@ -126,8 +124,8 @@ def coupled_description(description: Description) -> Description:
     for name, k in place.items():
         if limits["q_lower"][k] >= limits["q_upper"][k]:
             raise ModelError(
-                f"{description.source}: no position of joint {name!r} keeps the joints that "
-                "follow it within their limits; lock it"
+                f"{description.source or description.name}: no position of joint {name!r} keeps the "
+                "joints that follow it within their limits; lock it"
             )
     q = np.clip(description.q_reference[leaders], limits["q_lower"], limits["q_upper"])
     names = description.joint_names

@@ -15,6 +15,31 @@ BASE_JOINT = "floating_base"
 
 
 @dataclass(frozen=True)
+class Origin:
+    """Where a model comes from; as text it is what errors call it.
+
+    Attributes:
+        label: What errors call it in full.
+        name: What they call it where it is known which one is meant.
+        robot: Name of a robot that has no other.
+        file: The file that it was read from; None for one from memory.
+    """
+
+    label: str
+    name: str
+    robot: str
+    file: Path | None = None
+
+    @classmethod
+    def of(cls, path: Path) -> Origin:
+        """Return that of a file."""
+        return cls(str(path), path.name, path.stem, path)
+
+    def __str__(self) -> str:
+        return self.label
+
+
+@dataclass(frozen=True)
 class Springs:
     """Linear springs at joints.
 

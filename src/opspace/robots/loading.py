@@ -8,13 +8,16 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from opspace.errors import ModelError, missing_extra
 from opspace.robots.adapter import AdapterBase
 from opspace.robots.description import Description
 from opspace.robots.joint_roles import ALL_WITH_A_MOTOR, JointChoice
-from opspace.robots.protocol import Robot
-from opspace.robots.urdf import describe_urdf, read_urdf
+from opspace.robots.urdf import Urdf, describe_urdf, read_urdf
+
+if TYPE_CHECKING:
+    from opspace.robots.mujoco_model import MjcfRobot
 
 SUFFIXES = (".urdf", ".xml")
 
@@ -29,7 +32,7 @@ class RobotFile:
     """
 
     description: Description
-    build: Callable[[Description], Robot]
+    build: Callable[[Description], AdapterBase]
 
 
 def read_robot(
@@ -69,7 +72,17 @@ def read_robot(
 
 def _read_urdf(path: Path, backend: str, floating_base: bool, choice: JointChoice) -> RobotFile:
     urdf = read_urdf(path, choice.locked, floating_base, choice.joints)
-    description = describe_urdf(urdf, floating_base)
+    return robot_of_urdf(urdf, describe_urdf(urdf, floating_base), backend, floating_base)
+
+
+def robot_of_urdf(
+    urdf: Urdf, description: Description, backend: str, floating_base: bool
+) -> RobotFile:
+    """Hand what was read of a URDF, or of a model in memory, to a dynamics library.
+
+    Raises:
+        ModelError: The library cannot use it.
+    """
     if backend == "pinocchio":
         from opspace.robots.pinocchio import PinocchioRobot
         from opspace.robots.pinocchio_model import model_from_urdf
@@ -79,18 +92,28 @@ def _read_urdf(path: Path, backend: str, floating_base: bool, choice: JointChoic
     from opspace.robots.mujoco import MujocoRobot
     from opspace.robots.mujoco_model import compile_spec, urdf_spec
 
-    mujoco_model = compile_spec(urdf_spec(urdf, floating_base), path)
+    mujoco_model = compile_spec(urdf_spec(urdf, floating_base), urdf.origin)
     return _file(description, lambda d: MujocoRobot(d, mujoco_model))
 
 
 def _read_mjcf(path: Path, backend: str, floating_base: bool, choice: JointChoice) -> RobotFile:
-    from opspace.robots.mujoco_model import compile_spec, describe_mujoco, mjcf_spec
+    from opspace.robots.mujoco_model import mjcf_spec
 
-    read = mjcf_spec(path, floating_base, choice)
-    compiled = compile_spec(read.spec, path)
+    return robot_of_mjcf(mjcf_spec(path, floating_base, choice), backend)
+
+
+def robot_of_mjcf(read: MjcfRobot, backend: str) -> RobotFile:
+    """Compile what was read of an MJCF file, or of a model in memory.
+
+    Raises:
+        ModelError: MuJoCo cannot use it, or nothing of it moves.
+    """
+    from opspace.robots.mujoco_model import compile_spec, describe_mujoco
+
+    compiled = compile_spec(read.spec, read.origin)
     if compiled.nv == 0:
-        raise ModelError(f"{path}: the robot has no joint that moves")
-    description = describe_mujoco(compiled, path, read)
+        raise ModelError(f"{read.origin}: the robot has no joint that moves")
+    description = describe_mujoco(compiled, read)
     if backend == "pinocchio":
         from opspace.robots.pinocchio import PinocchioRobot
         from opspace.robots.pinocchio_model import carried_from_mujoco, model_from_mujoco

@@ -9,6 +9,7 @@ import numpy as np
 
 from opspace.machine.field_table import Record
 from opspace.robots.bodies import make_dynamics, no_bodies
+from opspace.robots.payload import Masses
 
 
 @dataclass(frozen=True)
@@ -60,7 +61,7 @@ class MotionAxes:
         placement: (bodies, 12) rotation by columns, then position, m.
         parent: (n,) the joint before each joint on the way to the base, −1 for none.
         frames: Frames by id.
-        masses: Mass of the moving links.
+        masses: Mass of the moving links, with what they carry.
         bodies: `RIGID_BODIES` that compiled code computes the dynamics from; none where the
             robot's library does.
         dynamics: `DYNAMICS`, where it computes them.
@@ -74,6 +75,6 @@ class MotionAxes:
     placement: np.ndarray
     parent: np.ndarray
     frames: Mapping[int, FramePlace]
-    masses: tuple[MassPoint, ...]
+    masses: Masses
     bodies: Record = field(default_factory=no_bodies)
     dynamics: Record = field(default_factory=lambda: make_dynamics(no_bodies()))

@@ -13,6 +13,7 @@ from opspace.robots.description import Description
 from opspace.robots.motion_axes import FramePlace, MassPoint, MotionAxes
 from opspace.robots.mujoco_names import frames
 from opspace.robots.passive_forces import carries_weight
+from opspace.robots.payload import Masses
 from opspace.robots.pinocchio_model import carried_from_mujoco, frame_ids, model_from_mujoco
 from opspace.robots.rigid_model import RigidModel, rigid_model
 from opspace.robots.world_axes import WorldAxes
@@ -39,30 +40,25 @@ class MujocoRobot(AdapterBase):
         self._mass = model.body_mass * moving
         self._total_mass = float(self._mass.sum())
         self._carries = carries_weight(model)
-        self._M = np.zeros((self.nv, self.nv))
-        self._bias = np.zeros(self.nv)
-        self._M_view, self._bias_view = self._M.view(), self._bias.view()
-        self._M_view.setflags(write=False)
-        self._bias_view.setflags(write=False)
+        self._hold(np.zeros((self.nv, self.nv)), np.zeros(self.nv))
         self._world = WorldAxes(model, self._data)
         self.update(self.q_reference, np.zeros(self.nv))
 
-    def fresh(self) -> MujocoRobot:
-        """Return the same robot with a state of its own; the model is shared."""
+    def _fresh(self) -> MujocoRobot:
         return MujocoRobot(self.description, self._model)
 
-    def motion_axes(self) -> MotionAxes | None:
-        """Return the arrays that compiled code reads, or None if a joint has several coordinates."""
+    def _motion_axes(self) -> MotionAxes | None:
         model = self._model
         if self.nq != self.nv or model.njnt != self.nv:
             return None
-        identity = np.concatenate((np.eye(3).reshape(9), np.zeros(3)))
         frames = {
-            id_: FramePlace(
-                body if site < 0 else model.nbody + site, self._last_dof(body), identity
-            )
+            id_: FramePlace(body, self._last_dof(body), self._on_body(site))
             for id_, (body, site) in enumerate(zip(self._bodies, self._sites, strict=True))
         }
+        links = [
+            MassPoint(b, self._last_dof(b), float(model.body_mass[b]), model.body_ipos[b].copy())
+            for b in np.flatnonzero(model.body_weldid > 0).tolist()
+        ]
         return MotionAxes(
             q=self._q,
             v=self._v,
@@ -72,21 +68,24 @@ class MujocoRobot(AdapterBase):
             placement=self._world.placement,
             parent=np.array(model.dof_parentid, dtype=np.int64),
             frames=frames,
-            masses=tuple(
-                MassPoint(
-                    b, self._last_dof(b), float(model.body_mass[b]), model.body_ipos[b].copy()
-                )
-                for b in self._massive
-            ),
+            masses=Masses(links, frames),
         )
 
-    def rigid_model(self) -> RigidModel | None:
+    def _rigid_model(self) -> RigidModel | None:
         """Return the bodies as numbers; they are those of the same model in Pinocchio."""
         model = model_from_mujoco(self._model)
         carried = carried_from_mujoco(self._model)
         return rigid_model(
             model, frame_ids(model, self.description), carried, self.description.springs
         )
+
+    def _on_body(self, site: int) -> np.ndarray:
+        """Return where a site is on its body, (12,); nowhere else for the body itself, −1."""
+        rotation, position = np.eye(3).reshape(9), np.zeros(3)
+        if site >= 0:
+            mujoco.mju_quat2Mat(rotation, self._model.site_quat[site])
+            position = self._model.site_pos[site]
+        return np.concatenate((rotation.reshape(3, 3).T.reshape(9), position))
 
     def _last_dof(self, body: int) -> int:
         """Return the last joint coordinate that moves a body, −1 for none."""
@@ -124,9 +123,12 @@ class MujocoRobot(AdapterBase):
             self.description.springs.add_to(self._bias, self._q)
         self._world.fill()
 
+    def _links(self) -> tuple[float, np.ndarray]:
+        return self._total_mass, np.array(self._model.opt.gravity)
+
     def _gravity(self, _: int) -> np.ndarray:
         # g(q) = -sum_i m_i J_i^T g, which is the whole mass at the centre of mass.
-        g = -self._total_mass * (self.com_jacobian().T @ self._model.opt.gravity)
+        g = -self._total_mass * (self._com_jacobian(0).T @ self._model.opt.gravity)
         return g - self._weight_carried() if self._carries else g
 
     def _weight_carried(self) -> np.ndarray:

@@ -11,14 +11,15 @@ from pathlib import Path
 import mujoco
 
 from opspace.errors import ModelError
+from opspace.robots.description import Origin
 
 
-def drop_missing(spec: mujoco.MjSpec, path: Path) -> tuple[str, ...]:
+def drop_missing(spec: mujoco.MjSpec, origin: Origin) -> tuple[str, ...]:
     """Take out shapes whose mesh file is missing, and paint plain what has no picture.
 
     Args:
         spec: The specification; it is changed.
-        path: The file that it was read from.
+        origin: Where it comes from.
 
     Returns:
         What is missing, a sentence each.
@@ -31,7 +32,7 @@ def drop_missing(spec: mujoco.MjSpec, path: Path) -> tuple[str, ...]:
         if geom.meshname in missing:
             if _gives_inertia(spec, geom):
                 raise ModelError(
-                    f"{path}: mesh file {missing[geom.meshname].file!r} is missing, and the "
+                    f"{origin}: mesh file {missing[geom.meshname].file!r} is missing, and the "
                     f"inertia of body {geom.parent.name!r} comes from it"
                 )
             spec.delete(geom)

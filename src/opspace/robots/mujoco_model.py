@@ -14,7 +14,7 @@ import numpy as np
 
 from opspace.errors import ModelError
 from opspace.robots.adapter import held_joints
-from opspace.robots.description import BASE_JOINT, WORLD, Description, mid_range
+from opspace.robots.description import BASE_JOINT, WORLD, Description, Origin, mid_range
 from opspace.robots.joint_roles import (
     ALL_WITH_A_MOTOR,
     JointChoice,
@@ -54,12 +54,14 @@ class MjcfRobot(NamedTuple):
 
     Attributes:
         spec: To be compiled.
+        origin: Where it comes from.
         roles: What became of the joints.
         held: Numbers of the bodies that lost one.
         warnings: What else the controller does not follow, a sentence each.
     """
 
     spec: mujoco.MjSpec
+    origin: Origin
     roles: JointRoles
     held: frozenset[int]
     warnings: tuple[str, ...]
@@ -91,6 +93,7 @@ def mujoco_model(
         ModelError: MuJoCo cannot use the file.
     """
     path = Path(source)
+    origin = Origin.of(path)
     if path.suffix == ".urdf":
         urdf = read_urdf(path, locked_joints, floating_base)
         spec = urdf_spec(urdf, floating_base)
@@ -100,9 +103,9 @@ def mujoco_model(
         read = mjcf_spec(path, floating_base, JointChoice.of(None, locked_joints))
         spec = read.spec
         if read.roles.couplings:
-            couple(spec, read.roles.couplings, _zero(compile_spec(spec, path)))
+            couple(spec, read.roles.couplings, _zero(compile_spec(spec, origin)))
     add_scenery(spec)
-    model = compile_spec(spec, path)
+    model = compile_spec(spec, origin)
     # Where actuators carry weight, MuJoCo counts it to them; the plant drives joints without any.
     model.jnt_actgravcomp[:] = 0
     return model
@@ -143,21 +146,46 @@ def mjcf_spec(path: Path, floating_base: bool, choice: JointChoice = ALL_WITH_A_
     """
     if not path.is_file():
         raise ModelError(f"{path}: no such file")
+    origin = Origin.of(path)
     try:
         spec = mujoco.MjSpec.from_file(str(path))
     except (ValueError, RuntimeError) as error:
-        raise _refused(path, error) from None
+        raise _refused(origin, error) from None
+    return reduce_spec(spec, origin, floating_base, choice)
+
+
+def reduce_spec(
+    spec: mujoco.MjSpec,
+    origin: Origin,
+    floating_base: bool,
+    choice: JointChoice,
+) -> MjcfRobot:
+    """Hold the joints of a specification that are not controlled.
+
+    Args:
+        spec: The specification; it is changed.
+        origin: Where it comes from.
+        floating_base: Whether to free the root body where it is not.
+        choice: Which joints are controlled, and where others are held.
+
+    Returns:
+        What is to be compiled, and what became of the joints.
+
+    Raises:
+        ModelError: MuJoCo refuses it, or joints are asked to move in a way that they cannot.
+        UnknownNameError: No joint has a name that is asked for.
+    """
     if floating_base:
-        _free_mjcf(spec, path)
-    missing = drop_missing(spec, path)
+        _free_mjcf(spec, origin)
+    missing = drop_missing(spec, origin)
     # A link that is held keeps its frame.
     spec.compiler.fusestatic = False
-    model = compile_spec(spec, path)
-    roles = assign_roles(file_joints(model), choice, path.name)
+    model = compile_spec(spec, origin)
+    roles = assign_roles(file_joints(model), choice, origin.name)
     names = joint_names(model)
     held = {int(b) for b, n in zip(model.jnt_bodyid, names, strict=True) if n in roles.locked}
     hold_joints(spec, model, roles)
-    return MjcfRobot(spec, roles, frozenset(held), (*missing, *equality_warnings(model)))
+    return MjcfRobot(spec, origin, roles, frozenset(held), (*missing, *equality_warnings(model)))
 
 
 def urdf_spec(urdf: Urdf, floating_base: bool) -> mujoco.MjSpec:
@@ -177,13 +205,14 @@ def urdf_spec(urdf: Urdf, floating_base: bool) -> mujoco.MjSpec:
     try:
         spec = mujoco.MjSpec.from_string(to_xml(urdf, inertias=False, compiler=compiler))
     except (ValueError, RuntimeError) as error:
-        raise _refused(urdf.path, error) from None
+        raise _refused(urdf.origin, error) from None
     spec.modelname = urdf.name
     if floating_base:
-        _free(spec.body(urdf.root), urdf.path)
+        _free(spec.body(urdf.root), urdf.origin)
     for joint in urdf.moving_joints:
         element = spec.joint(joint.name)
         limited = np.isfinite(joint.lower) and np.isfinite(joint.upper)
+        element.armature = joint.armature
         element.limited = int(limited)
         element.range = [joint.lower, joint.upper] if limited else [0.0, 0.0]
         element.actfrclimited = int(np.isfinite(joint.effort))
@@ -194,12 +223,12 @@ def urdf_spec(urdf: Urdf, floating_base: bool) -> mujoco.MjSpec:
     return spec
 
 
-def compile_spec(spec: mujoco.MjSpec, path: Path) -> mujoco.MjModel:
+def compile_spec(spec: mujoco.MjSpec, origin: Origin) -> mujoco.MjModel:
     """Compile a specification.
 
     Args:
         spec: The specification.
-        path: File to name in an error.
+        origin: Where it comes from.
 
     Returns:
         The compiled model.
@@ -210,24 +239,25 @@ def compile_spec(spec: mujoco.MjSpec, path: Path) -> mujoco.MjModel:
     try:
         model = spec.compile()
     except (ValueError, RuntimeError) as error:
-        raise _refused(path, error) from None
+        raise _refused(origin, error) from None
     if np.any(model.tendon_armature):
-        raise ModelError(f"{path}: tendon armature is not supported")
+        raise ModelError(f"{origin}: tendon armature is not supported")
     armature = np.flatnonzero(getattr(model, "actuator_armature", ()))  # since MuJoCo 4
     if not np.isin(model.actuator_trntype[armature], ON_JOINT).all():
-        raise ModelError(f"{path}: armature of actuators that are not on a joint is not supported")
+        raise ModelError(
+            f"{origin}: armature of actuators that are not on a joint is not supported"
+        )
     if model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_GRAVITY:
         model.opt.gravity[:] = 0.0
     return model
 
 
-def describe_mujoco(model: mujoco.MjModel, path: Path, read: MjcfRobot) -> Description:
+def describe_mujoco(model: mujoco.MjModel, read: MjcfRobot) -> Description:
     """Collect names, limits and postures from a compiled MJCF model.
 
     Args:
         model: The compiled model.
         read: What it was compiled from.
-        path: The file it came from.
 
     Returns:
         The description.
@@ -241,8 +271,8 @@ def describe_mujoco(model: mujoco.MjModel, path: Path, read: MjcfRobot) -> Descr
     units = _units(model)
     efforts = [effort_unit(unit) for unit in units]
     return Description(
-        name=path.stem,
-        source=path,
+        name=read.origin.robot,
+        source=read.origin.file,
         nq=model.nq,
         nv=model.nv,
         joint_names=names,
@@ -309,24 +339,24 @@ def _middle(model: mujoco.MjModel, lower: np.ndarray, upper: np.ndarray) -> np.n
     return q
 
 
-def _refused(path: Path, error: Exception) -> ModelError:
-    return ModelError(f"{path}: MuJoCo cannot use it: {' '.join(str(error).split())}")
+def _refused(origin: Origin, error: Exception) -> ModelError:
+    return ModelError(f"{origin}: MuJoCo cannot use it: {' '.join(str(error).split())}")
 
 
-def _free(root: mujoco.MjsBody, path: Path) -> None:
+def _free(root: mujoco.MjsBody, origin: Origin) -> None:
     if root.joints:
         name = root.joints[0].name
-        raise ModelError(f"{path}: root body {root.name!r} has joint {name!r} and cannot float")
+        raise ModelError(f"{origin}: root body {root.name!r} has joint {name!r} and cannot float")
     root.add_freejoint(name=BASE_JOINT)
 
 
-def _free_mjcf(spec: mujoco.MjSpec, path: Path) -> None:
+def _free_mjcf(spec: mujoco.MjSpec, origin: Origin) -> None:
     roots = [body for body in spec.worldbody.bodies if body.joints or body.bodies]
     if len(roots) != 1:
-        raise ModelError(f"{path}: a floating base needs one root body, not {len(roots)}")
+        raise ModelError(f"{origin}: a floating base needs one root body, not {len(roots)}")
     if roots[0].joints and roots[0].joints[0].type == mujoco.mjtJoint.mjJNT_FREE:
         return
-    _free(roots[0], path)
+    _free(roots[0], origin)
     spec.compiler.boundmass = max(spec.compiler.boundmass, NEGLIGIBLE)
     spec.compiler.boundinertia = max(spec.compiler.boundinertia, NEGLIGIBLE)
     pose = np.concatenate([roots[0].pos, roots[0].quat])

@@ -13,6 +13,7 @@ import pinocchio as pin
 from opspace.robots.adapter import AdapterBase
 from opspace.robots.description import Description
 from opspace.robots.motion_axes import MotionAxes
+from opspace.robots.payload import Masses
 from opspace.robots.pinocchio_model import frame_ids
 from opspace.robots.rigid_model import RigidModel, frame_places, mass_points, rigid_model
 
@@ -45,25 +46,23 @@ class PinocchioRobot(AdapterBase):
         self._to_pin = _quaternion_order(self.nq, description.quaternions, (1, 2, 3, 0))
         self._from_pin = _quaternion_order(self.nq, description.quaternions, (3, 0, 1, 2))
         # M is symmetric; the transpose of Eigen's column-major array is C-contiguous.
-        self._M_view = self._data.M.T
-        self._M_view.setflags(write=False)
-        self._bias_view = self._data.nle
-        self._bias_view.setflags(write=False)
-        self._writable_bias = self._data.nle
+        self._hold(self._data.M.T, self._data.nle)
         self._accelerations_known = False
         self._placement = _contiguous_placements(self._data)
         self.update(self.q_reference, self._zero)
 
-    def fresh(self) -> PinocchioRobot:
-        """Return the same robot with a state of its own; the model is shared."""
+    def _parts(self) -> tuple[Any, ...]:
+        return self.description, self._model, self._carried
+
+    def _fresh(self) -> PinocchioRobot:
         return PinocchioRobot(self.description, self._model, self._carried)
 
-    def motion_axes(self) -> MotionAxes | None:
-        """Return the arrays that compiled code reads, or None if a joint has several coordinates."""
+    def _motion_axes(self) -> MotionAxes | None:
         model = self._model
         if self.nq != self.nv or model.njoints != self.nv + 1 or self._placement is None:
             return None
         last = np.arange(-1, self.nv)
+        places = frame_places(model, self._frames, last)
         return MotionAxes(
             q=self._q,
             v=self._v,
@@ -72,12 +71,11 @@ class PinocchioRobot(AdapterBase):
             axes=self._data.J.T,
             placement=self._placement,
             parent=np.array([model.parents[j] - 1 for j in range(1, model.njoints)]),
-            frames=frame_places(model, self._frames, last),
-            masses=mass_points(model, last),
+            frames=places,
+            masses=Masses(mass_points(model, last), places),
         )
 
-    def rigid_model(self) -> RigidModel | None:
-        """Return the bodies as numbers, or None if there is a joint that they cannot describe."""
+    def _rigid_model(self) -> RigidModel | None:
         return rigid_model(self._model, self._frames, self._carried, self.description.springs)
 
     def integrate(self, q: np.ndarray, v: np.ndarray, dt: float) -> np.ndarray:
@@ -103,12 +101,16 @@ class PinocchioRobot(AdapterBase):
         # The world convention leaves the joint Jacobians in the data, which the frames read.
         composite_inertia(model, data, q, WORLD_CONVENTION)
         if self._carried is not None:
-            self._writable_bias -= self._weight_carried()
+            self._bias -= self._weight_carried()
         if self.description.springs is not None:
-            self.description.springs.add_to(self._writable_bias, self._q)
+            self.description.springs.add_to(self._bias, self._q)
 
     def _weight_carried(self) -> np.ndarray:
         return pin.computeGeneralizedGravity(self._carried, self._carried_data, self._q_pin)
+
+    def _links(self) -> tuple[float, np.ndarray]:
+        mass = sum(float(inertia.mass) for inertia in list(self._model.inertias)[1:])
+        return mass, np.array(self._model.gravity.linear)
 
     def _gravity(self, _: int) -> np.ndarray:
         g = np.array(pin.computeGeneralizedGravity(self._model, self._scratch, self._q_pin))

@@ -44,7 +44,9 @@ def model_from_urdf(urdf: Urdf, floating_base: bool) -> Any:
         fixed = pin.buildModelFromXML(to_xml(urdf, inertias=True, prefix="joint "))
     except (ValueError, RuntimeError) as error:
         reason = " ".join(str(error).split())
-        raise ModelError(f"{urdf.path}: Pinocchio cannot use it: {reason}") from None
+        raise ModelError(f"{urdf.origin}: Pinocchio cannot use it: {reason}") from None
+    for own in urdf.moving_joints:
+        fixed.armature[fixed.joints[fixed.getJointId(f"joint {own.name}")].idx_v] = own.armature
     if not floating_base:
         return fixed
     base = pin.Model()
@@ -52,7 +54,21 @@ def model_from_urdf(urdf: Urdf, floating_base: bool) -> Any:
     frame = base.addFrame(
         pin.Frame(BASE_JOINT, joint, 0, pin.SE3.Identity(), pin.FrameType.JOINT), False
     )
-    return pin.appendModel(base, fixed, frame, pin.SE3.Identity())
+    model = pin.appendModel(base, fixed, frame, pin.SE3.Identity())
+    # Pinocchio 3.8 turns what is fixed to a link the wrong way where it joins two models.
+    for j in range(1, fixed.njoints):
+        model.inertias[model.getJointId(fixed.names[j])] = fixed.inertias[j]
+    model.inertias[joint] = inertia_on_world(fixed)
+    return model
+
+
+def inertia_on_world(model: Any) -> Any:
+    """Return what is fixed to the world of a model, which has no joint that it could count for."""
+    total = pin.Inertia.Zero()
+    for frame in model.frames:
+        if frame.parentJoint == 0:
+            total += frame.placement.act(frame.inertia)
+    return total
 
 
 def carried_from_mujoco(mj: MjModel) -> Any | None:

@@ -44,7 +44,6 @@ class Robot(Protocol):
     nq: int
     nv: int
     joint_names: tuple[str, ...]
-    frame_names: tuple[str, ...]
     tool: str
     q_reference: np.ndarray
     configurations: Mapping[str, np.ndarray]
@@ -55,6 +54,11 @@ class Robot(Protocol):
     actuated: np.ndarray
     floating_base: bool
     locked_joints: tuple[str, ...]
+
+    @property
+    def frame_names(self) -> tuple[str, ...]:
+        """Return the names of all frames; the index is the frame's id."""
+        ...
 
     @property
     def q(self) -> np.ndarray:

@@ -5,17 +5,30 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TYPE_CHECKING, TypeAlias
 from warnings import warn
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from opspace.errors import ModelError, ModelWarning, missing_extra, unknown_name
+from opspace.robots.adapter import AdapterBase
 from opspace.robots.catalogue import CATALOGUE, SHIPPED, CatalogueEntry, locate
 from opspace.robots.description import Description
+from opspace.robots.from_memory import is_model, read_model
 from opspace.robots.joint_roles import JointChoice
 from opspace.robots.loading import SUFFIXES, RobotFile, read_robot
-from opspace.robots.protocol import Robot
+
+if TYPE_CHECKING:
+    import mujoco
+    import pinocchio
+
+    # Compiled modules without type stubs.
+    Model: TypeAlias = (
+        mujoco.MjModel  # pyright: ignore[reportAttributeAccessIssue]
+        | mujoco.MjSpec  # pyright: ignore[reportAttributeAccessIssue]
+        | pinocchio.Model  # pyright: ignore[reportAttributeAccessIssue]
+    )
 
 BACKENDS = ("pinocchio", "mujoco")
 
@@ -54,7 +67,7 @@ def available_robots() -> list[RobotInfo]:
 
 
 def load_robot(
-    name_or_path: str | Path,
+    source: str | Path | Model,
     *,
     backend: str = "pinocchio",
     floating_base: bool = False,
@@ -62,15 +75,17 @@ def load_robot(
     locked: Collection[str] | Mapping[str, float] = (),
     tool: str | None = None,
     reference: ArrayLike | Mapping[str, float] | None = None,
-) -> Robot:
-    """Load a robot by name or from a URDF or MJCF file.
+) -> AdapterBase:
+    """Load a robot by name, from a URDF or MJCF file, or from a model in memory.
 
     The robot has the joints that are controlled. What carries the others is held fixed; joints
     that follow a controlled one (mimic in URDF, an equality of two joints in MJCF) move with it,
     and count in its inertia and its load.
 
     Args:
-        name_or_path: A name that ``available_robots`` lists, or a path ending in .urdf or .xml.
+        source: A name that ``available_robots`` lists, a path ending in .urdf or .xml, or a
+            ``mujoco.MjModel``, ``mujoco.MjSpec`` or ``pinocchio.Model``. A model is read as its
+            file would be, and left as it is.
         backend: Library that computes the dynamics, "pinocchio" or "mujoco".
         floating_base: Free the root link. Humanoids and quadrupeds loaded by name are always free.
         joints: Names or patterns ("left_*") of the joints to control; those that have a motor
@@ -96,10 +111,18 @@ def load_robot(
     if backend not in BACKENDS:
         raise unknown_name("backend", backend, BACKENDS)
     choice = JointChoice.of(joints, locked)
-    if isinstance(name_or_path, Path) or Path(name_or_path).suffix in SUFFIXES:
-        file = read_robot(Path(name_or_path), backend, floating_base, choice)
+    if is_model(source):
+        file = read_model(source, backend, floating_base, choice)
         return _built(file, _chosen(file.description, tool, reference))
-    entry = _entry(name_or_path)
+    if not isinstance(source, str | Path):
+        raise ModelError(
+            "a robot is loaded by name, from a file, or from a mujoco.MjModel, mujoco.MjSpec or "
+            f"pinocchio.Model, not from a {type(source).__name__}"
+        )
+    if isinstance(source, Path) or Path(source).suffix in SUFFIXES:
+        file = read_robot(Path(source), backend, floating_base, choice)
+        return _built(file, _chosen(file.description, tool, reference))
+    entry = _entry(source)
     path = locate(entry)
     if path is None:
         raise missing_extra(entry.package, "robots")
@@ -107,7 +130,7 @@ def load_robot(
     if joints is None:
         choice = replace(choice, locked={**dict.fromkeys(entry.locked_joints), **choice.locked})
     file = read_robot(path, backend, free, choice)
-    named = _named(file.description, name_or_path, entry)
+    named = _named(file.description, source, entry)
     return _built(file, _chosen(named, tool, reference))
 
 
@@ -138,7 +161,7 @@ def _chosen(
     return replace(description, q_reference=q)
 
 
-def _built(file: RobotFile, description: Description) -> Robot:
+def _built(file: RobotFile, description: Description) -> AdapterBase:
     for sentence in description.warnings:
         warn(f"{description.name}: {sentence}", ModelWarning, stacklevel=3)
     return file.build(description)

@@ -17,6 +17,7 @@ from opspace.robots.bodies import RIGID_BODIES
 from opspace.robots.description import Springs
 from opspace.robots.joint_kinds import ALIGNED, BALL, HINGE, SLIDE, TRANSLATION
 from opspace.robots.motion_axes import FramePlace, MassPoint, MotionAxes
+from opspace.robots.payload import Masses
 
 
 @dataclass(frozen=True)
@@ -26,12 +27,12 @@ class RigidModel:
     Attributes:
         bodies: The tree, `RIGID_BODIES`.
         frames: Frames by the robot's own ids.
-        masses: Mass of the moving links.
+        masses: Mass of the moving links, with what they carry; it is in the tree as well.
     """
 
     bodies: Record
     frames: Mapping[int, FramePlace]
-    masses: tuple[MassPoint, ...]
+    masses: Masses
 
     def motion_axes(self, dynamics: Record, q: np.ndarray, v: np.ndarray) -> MotionAxes:
         """Return the arrays that compiled code reads of a robot that it computes itself.
@@ -104,9 +105,8 @@ def rigid_model(
         "stiffness": stiffness,
         "relaxed": relaxed,
     }
-    return RigidModel(
-        RIGID_BODIES.make({}, fields), frame_places(model, frames, last), mass_points(model, last)
-    )
+    bodies, places = RIGID_BODIES.make({}, fields), frame_places(model, frames, last)
+    return RigidModel(bodies, places, Masses(mass_points(model, last), places, bodies))
 
 
 def frame_places(model: Any, frames: Sequence[int], last: np.ndarray) -> dict[int, FramePlace]:
@@ -129,7 +129,7 @@ def frame_places(model: Any, frames: Sequence[int], last: np.ndarray) -> dict[in
 
 
 def mass_points(model: Any, last: np.ndarray) -> tuple[MassPoint, ...]:
-    """Return the mass of the moving links of a model.
+    """Return the mass of the moving links of a model, also where it is zero.
 
     Args:
         model: The ``pinocchio.Model``.
@@ -138,7 +138,7 @@ def mass_points(model: Any, last: np.ndarray) -> tuple[MassPoint, ...]:
     return tuple(
         MassPoint(j, int(last[j]), float(inertia.mass), np.array(inertia.lever))
         for j, inertia in enumerate(model.inertias)
-        if j > 0 and inertia.mass > 0.0
+        if j > 0
     )
 
 

@@ -11,7 +11,14 @@ from pathlib import Path
 import numpy as np
 
 from opspace.errors import ModelError, unknown_name
-from opspace.robots.description import BASE_JOINT, WORLD, Description, mid_range, unused
+from opspace.robots.description import (
+    BASE_JOINT,
+    WORLD,
+    Description,
+    Origin,
+    mid_range,
+    unused,
+)
 from opspace.robots.joint_roles import (
     Coupling,
     FileJoint,
@@ -39,7 +46,12 @@ MOVING = ("revolute", "continuous", "prismatic")
 
 @dataclass(frozen=True)
 class UrdfJoint:
-    """One joint of the tree; limits are infinite where the file gives none."""
+    """One joint of the tree; limits are infinite where the file gives none.
+
+    Attributes:
+        armature: Inertia of its motor, kg·m² or kg. URDF has no word for it; a model in memory may
+            bring one.
+    """
 
     name: str
     kind: str
@@ -51,6 +63,7 @@ class UrdfJoint:
     effort: float
     axis: tuple[float, ...]
     element: ET.Element
+    armature: float = 0.0
 
     @property
     def moving(self) -> bool:
@@ -63,7 +76,7 @@ class Urdf:
     """A URDF reduced to its kinematics and inertias, joints in depth-first order."""
 
     name: str
-    path: Path
+    origin: Origin
     root: str
     links: dict[str, ET.Element | None]
     joints: tuple[UrdfJoint, ...]
@@ -96,23 +109,43 @@ def read_urdf(
         ModelError: The file does not exist, is no URDF, is not one tree, or its root cannot float.
         UnknownNameError: A joint that is asked for or followed is not in the file.
     """
-    root = _parse(path)
-    _check_numbers(root, path)
-    bodies = [_name(link, path) for link in root.findall("link")]
+    choice = JointChoice.of(joints, locked)
+    return reduce_urdf(_parse(path), Origin.of(path), choice, floating_base)
+
+
+def reduce_urdf(
+    root: ET.Element, origin: Origin, choice: JointChoice, floating_base: bool = False
+) -> Urdf:
+    """Read the outermost element of a URDF; see `read_urdf`.
+
+    Args:
+        root: The element.
+        origin: Where it comes from.
+        choice: Which joints are controlled, and where others are held.
+        floating_base: Whether the root link is to move freely.
+
+    Returns:
+        The robot's tree.
+
+    Raises:
+        ModelError: It is no URDF, is not one tree, or its root cannot float.
+        UnknownNameError: A joint that is asked for or followed is not there.
+    """
+    _check_numbers(root, origin)
+    bodies = [_name(link, origin) for link in root.findall("link")]
     for repeated in (n for n in bodies if bodies.count(n) > 1):
-        raise ModelError(f"{path}: link {repeated!r} occurs twice")
+        raise ModelError(f"{origin}: link {repeated!r} occurs twice")
     links = dict(zip(bodies, (link.find("inertial") for link in root.findall("link")), strict=True))
     elements = [joint for joint in root.findall("joint") if joint.get("type") is not None]
-    names = [_name(joint, path) for joint in elements]
+    names = [_name(joint, origin) for joint in elements]
     for repeated in (n for n in names if names.count(n) > 1):
-        raise ModelError(f"{path}: joint {repeated!r} occurs twice")
-    choice = JointChoice.of(joints, locked)
-    roles = assign_roles(_file_joints(elements, path), choice, path.name)
-    built = {_name(e, path): _joint(e, roles.locked, links, path) for e in elements}
-    base, ordered = _depth_first(built, links, path)
+        raise ModelError(f"{origin}: joint {repeated!r} occurs twice")
+    roles = assign_roles(_file_joints(elements, origin), choice, origin.name)
+    built = {_name(e, origin): _joint(e, roles.locked, links, origin) for e in elements}
+    base, ordered = _depth_first(built, links, origin)
     if floating_base and base == WORLD:
-        raise ModelError(f"{path}: the root link {WORLD!r} cannot float")
-    return Urdf(root.get("name") or path.stem, path, base, links, ordered, roles)
+        raise ModelError(f"{origin}: the root link {WORLD!r} cannot float")
+    return Urdf(root.get("name") or origin.robot, origin, base, links, ordered, roles)
 
 
 def describe_urdf(urdf: Urdf, floating_base: bool) -> Description:
@@ -141,7 +174,7 @@ def describe_urdf(urdf: Urdf, floating_base: bool) -> Description:
     frames = ([] if WORLD in urdf.links else [WORLD]) + list(urdf.links)
     return Description(
         name=urdf.name,
-        source=urdf.path,
+        source=urdf.origin.file,
         nq=len(q),
         nv=len(names),
         joint_names=tuple(names),
@@ -158,11 +191,11 @@ def describe_urdf(urdf: Urdf, floating_base: bool) -> Description:
         floating_base=floating_base,
         couplings=urdf.roles.couplings,
         locked=urdf.roles.locked,
-        warnings=(*urdf.roles.warnings, *_warnings(moving)),
+        warnings=(*urdf.roles.warnings, *limit_warnings(moving)),
     )
 
 
-def _warnings(joints: Iterable[UrdfJoint]) -> Iterator[str]:
+def limit_warnings(joints: Iterable[UrdfJoint]) -> Iterator[str]:
     """Say where a limit is there that limits nothing."""
     stuck = [j.name for j in joints if j.kind != "continuous" and math.isinf(j.upper)]
     if stuck:
@@ -183,7 +216,7 @@ def _parse(path: Path) -> ET.Element:
     return root
 
 
-def _check_numbers(root: ET.Element, path: Path) -> None:
+def _check_numbers(root: ET.Element, origin: Origin) -> None:
     for owner in (*root.findall("link/inertial"), *root.findall("joint")):
         for element in owner.iter():
             for key in NUMBERS & set(element.attrib):
@@ -195,32 +228,32 @@ def _check_numbers(root: ET.Element, path: Path) -> None:
                 if len(values) != size or not np.isfinite(values).all():
                     text = element.attrib[key]
                     raise ModelError(
-                        f"{path}: {key}={text!r} of <{element.tag}> is not {size} number(s)"
+                        f"{origin}: {key}={text!r} of <{element.tag}> is not {size} number(s)"
                     )
 
 
-def _name(element: ET.Element, path: Path) -> str:
+def _name(element: ET.Element, origin: Origin) -> str:
     name = element.get("name")
     if not name:
-        raise ModelError(f"{path}: a <{element.tag}> has no name")
+        raise ModelError(f"{origin}: a <{element.tag}> has no name")
     return name
 
 
-def _file_joints(elements: Sequence[ET.Element], path: Path) -> list[FileJoint]:
-    moving = {_name(e, path): e for e in elements if e.get("type") in MOVING}
-    names = [_name(e, path) for e in elements]
-    return [_file_joint(name, e, moving, names, path) for name, e in moving.items()]
+def _file_joints(elements: Sequence[ET.Element], origin: Origin) -> list[FileJoint]:
+    moving = {_name(e, origin): e for e in elements if e.get("type") in MOVING}
+    names = [_name(e, origin) for e in elements]
+    return [_file_joint(name, e, moving, names, origin) for name, e in moving.items()]
 
 
 def _file_joint(
-    name: str, element: ET.Element, moving: Collection[str], names: Sequence[str], path: Path
+    name: str, element: ET.Element, moving: Collection[str], names: Sequence[str], origin: Origin
 ) -> FileJoint:
     mimic = element.find("mimic")
     if mimic is None:
         return FileJoint(name)
     leader = mimic.get("joint", "")
     if leader not in names:
-        raise unknown_name(f"joint that {name!r} of {path.name} mimics,", leader, names)
+        raise unknown_name(f"joint that {name!r} of {origin.name} mimics,", leader, names)
     ratio, offset = float(mimic.get("multiplier", 1.0)), float(mimic.get("offset", 0.0))
     if leader not in moving:
         return FileJoint(name, offset, "a fixed joint leads", never=True)
@@ -228,32 +261,34 @@ def _file_joint(
 
 
 def _joint(
-    element: ET.Element, locked: Mapping[str, float | None], links: Collection[str], path: Path
+    element: ET.Element, locked: Mapping[str, float | None], links: Collection[str], origin: Origin
 ) -> UrdfJoint:
-    name, kind = _name(element, path), element.get("type", "")
+    name, kind = _name(element, origin), element.get("type", "")
     if kind not in (*MOVING, "fixed"):
-        raise ModelError(f"{path}: joint {name!r} has type {kind!r}, not fixed or one of {MOVING}")
+        raise ModelError(
+            f"{origin}: joint {name!r} has type {kind!r}, not fixed or one of {MOVING}"
+        )
     ends = {}
     for end in ("parent", "child"):
         tag = element.find(end)
         ends[end] = tag.get("link", "") if tag is not None else ""
         if ends[end] not in links:
-            raise ModelError(f"{path}: {end} link {ends[end]!r} of joint {name!r} does not exist")
+            raise ModelError(f"{origin}: {end} link {ends[end]!r} of joint {name!r} does not exist")
     limit = element.find("limit")
     if kind in ("revolute", "prismatic") and limit is None:
-        raise ModelError(f"{path}: joint {name!r} has no <limit>")
+        raise ModelError(f"{origin}: joint {name!r} has no <limit>")
     given = limit.attrib if limit is not None else {}
     lower, upper = float(given.get("lower", 0.0)), float(given.get("upper", 0.0))
     if kind in ("revolute", "prismatic") and lower > upper:
-        raise ModelError(f"{path}: lower limit of joint {name!r} is above its upper limit")
+        raise ModelError(f"{origin}: lower limit of joint {name!r} is above its upper limit")
     if kind in ("revolute", "prismatic") and lower == upper != 0.0 and name not in locked:
         raise ModelError(
-            f"{path}: lower and upper limit of joint {name!r} are both {lower:g}: it cannot move; "
+            f"{origin}: lower and upper limit of joint {name!r} are both {lower:g}: it cannot move; "
             "make it a fixed joint, or give it a range"
         )
     if kind == "continuous" or lower == upper:
         lower, upper = -math.inf, math.inf
-    axis, slides = _axis(element, path), kind == "prismatic"
+    axis, slides = _axis(element, origin), kind == "prismatic"
     held = locked.get(name)
     return UrdfJoint(
         name=name,
@@ -262,42 +297,42 @@ def _joint(
         child=ends["child"],
         lower=lower,
         upper=upper,
-        velocity=_largest(given, "velocity", name, path),
-        effort=_largest(given, "effort", name, path),
+        velocity=_largest(given, "velocity", name, origin),
+        effort=_largest(given, "effort", name, origin),
         axis=axis,
         element=element if held is None else held_at(element, axis, slides, held),
     )
 
 
-def _largest(limit: Mapping[str, str], key: str, joint: str, path: Path) -> float:
+def _largest(limit: Mapping[str, str], key: str, joint: str, origin: Origin) -> float:
     """Return a limit of both directions; 0 and −1 are how files say that there is none."""
     value = float(limit.get(key, 0.0))
     if value in (0.0, -1.0):
         return math.inf
     if value < 0.0:
         raise ModelError(
-            f"{path}: {key}={value:g} of joint {joint!r} is below zero; 0 or -1 is no limit"
+            f"{origin}: {key}={value:g} of joint {joint!r} is below zero; 0 or -1 is no limit"
         )
     return value
 
 
-def _axis(element: ET.Element, path: Path) -> tuple[float, ...]:
+def _axis(element: ET.Element, origin: Origin) -> tuple[float, ...]:
     tag = element.find("axis")
     text = tag.get("xyz", "1 0 0") if tag is not None else "1 0 0"
     direction = np.array(text.split(), dtype=float)
     length = float(np.linalg.norm(direction))
     if length == 0.0 and element.get("type") in MOVING:
-        raise ModelError(f"{path}: axis of joint {element.get('name')!r} has length zero")
+        raise ModelError(f"{origin}: axis of joint {element.get('name')!r} has length zero")
     return tuple((direction / (length or 1.0)).tolist())
 
 
 def _depth_first(
-    joints: dict[str, UrdfJoint], links: Collection[str], path: Path
+    joints: dict[str, UrdfJoint], links: Collection[str], origin: Origin
 ) -> tuple[str, tuple[UrdfJoint, ...]]:
     children = {j.child for j in joints.values()}
     roots = [link for link in links if link not in children]
     if len(roots) != 1:
-        raise ModelError(f"{path}: {len(roots)} root links {roots}, not one")
+        raise ModelError(f"{origin}: {len(roots)} root links {roots}, not one")
     below: dict[str, list[UrdfJoint]] = {}
     for name in sorted(joints, reverse=True):
         below.setdefault(joints[name].parent, []).append(joints[name])
@@ -307,7 +342,7 @@ def _depth_first(
         ordered.append(joint)
         pending.extend(below.get(joint.child, []))
     if len(ordered) != len(links) - 1 or len(ordered) != len(joints):
-        raise ModelError(f"{path}: the joints do not connect the links to one tree")
+        raise ModelError(f"{origin}: the joints do not connect the links to one tree")
     return roots[0], tuple(ordered)
 
 

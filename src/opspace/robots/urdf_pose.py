@@ -54,7 +54,7 @@ def held_at(joint: ET.Element, axis: tuple[float, ...], slides: bool, value: flo
     if slides:
         xyz = xyz + rotation @ direction * value
     else:
-        rpy = _matrix_rpy(rotation @ _turn(direction, value))
+        rpy = matrix_rpy(rotation @ _turn(direction, value))
     origin.set("xyz", " ".join(repr(float(x)) for x in xyz))
     origin.set("rpy", " ".join(repr(float(x)) for x in rpy))
     return held
@@ -66,7 +66,8 @@ def _turn(axis: np.ndarray, angle: float) -> np.ndarray:
     return np.eye(3) + math.sin(angle) * skew + (1.0 - math.cos(angle)) * skew @ skew
 
 
-def _matrix_rpy(R: np.ndarray) -> np.ndarray:
+def matrix_rpy(R: np.ndarray) -> np.ndarray:
+    """Return URDF's roll, pitch and yaw (3,) of a rotation matrix, rad."""
     pitch = math.atan2(-R[2, 0], math.hypot(R[0, 0], R[1, 0]))
     if math.hypot(R[0, 0], R[1, 0]) < 1e-9:  # roll and yaw turn about one axis
         return np.array([math.atan2(-R[1, 2], R[1, 1]), pitch, 0.0])

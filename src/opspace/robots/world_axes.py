@@ -14,7 +14,7 @@ class WorldAxes:
 
     Attributes:
         axes: (n, 6) motion that a unit of each velocity gives to a body, linear then angular.
-        placement: (bodies + sites, 12) rotations by columns, then positions, m.
+        placement: (bodies, 12) rotations by columns, then positions, m.
 
     Args:
         model: MuJoCo's model.
@@ -23,7 +23,7 @@ class WorldAxes:
 
     def __init__(self, model: Any, data: Any) -> None:
         self.axes = np.zeros((model.nv, 6))
-        self.placement = np.zeros((model.nbody + model.nsite, 12))
+        self.placement = np.zeros((model.nbody, 12))
         self._across = np.zeros((3, 3))
         angular, linear = data.cdof[:, :3], data.cdof[:, 3:]
         # MuJoCo's axes are about the centre of mass of their tree, whose joints stand together.
@@ -34,13 +34,10 @@ class WorldAxes:
             for first, end in zip([0, *ends], ends, strict=False)
         ]
         self._moment, self._linear = self.axes[:, :3], linear
-        bodies, sites = self.placement[: model.nbody], self.placement[model.nbody :]
         self._copies = [
             (self.axes[:, 3:], angular),
-            (bodies[:, :9].reshape(-1, 3, 3), _by_columns(data.xmat)),
-            (bodies[:, 9:], data.xpos),
-            (sites[:, :9].reshape(-1, 3, 3), _by_columns(data.site_xmat)),
-            (sites[:, 9:], data.site_xpos),
+            (self.placement[:, :9].reshape(-1, 3, 3), _by_columns(data.xmat)),
+            (self.placement[:, 9:], data.xpos),
         ]
 
     def fill(self) -> None:

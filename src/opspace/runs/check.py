@@ -110,7 +110,7 @@ def check_robot(robot: Robot) -> RobotCheck:
     joints = _joints(robot, calibration)
     return RobotCheck(
         robot=robot.name,
-        source=str(robot.source),
+        source=str(robot.source or "in memory"),
         dof=robot.nv,
         tool=robot.tool,
         joints=joints,

@@ -202,6 +202,9 @@ def _robot(about: dict[str, Any]) -> Robot:
         raise InputError(
             f"robot {found.name!r} has {found.nv} joints now, the recording {len(about['joints'])}"
         )
+    for name, frame in about.get("frames", {}).items():
+        found.add_frame(name, frame["parent"], frame["placement"])
+    found.tool = about["tool"]
     return found
 
 
