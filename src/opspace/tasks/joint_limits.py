@@ -12,7 +12,7 @@ import numpy as np
 
 from opspace.errors import InputError, unknown_name
 from opspace.law import PROFILES
-from opspace.law.scalars import LIMIT_LAWS, allowed_speed
+from opspace.law.scalars import LIMIT_LAWS, allowed_speed, last_command, stopping_command
 from opspace.tasks.known_attributes import KnownAttributes
 from opspace.tasks.validation import Array
 
@@ -210,6 +210,42 @@ class JointLimits(KnownAttributes):
         code = PROFILES.index(self.profile)
         return self.law.presence(d, towards, side.brake, self.buffer, code)
 
+    def stopping(
+        self, side: Side, position: float, speed: float, most: float, period: float
+    ) -> float:
+        """Acceleration towards a limit that a joint may have which is too fast for it.
+
+        Args:
+            side: The limit.
+            position: Joint position, rad or m.
+            speed: Joint velocity, rad/s or m/s.
+            most: Braking that the motors can give now, rad/s² or m/s²; inf where that is not known.
+            period: Time between two ticks, s; 0 where it is not known.
+
+        Returns:
+            rad/s² or m/s²; inf where it is not too fast, and in mode ``buffer``.
+        """
+        if not self.law.bound:
+            return math.inf
+        d, towards = side.sign * (side.limit - position), side.sign * speed
+        return stopping_command(d, towards, side.brake, most, self.k1, period)
+
+    def last(self, side: Side, position: float, speed: float) -> float:
+        """Acceleration towards a limit with which a joint that is too fast just stops at it.
+
+        Args:
+            side: The limit.
+            position: Joint position, rad or m.
+            speed: Joint velocity, rad/s or m/s.
+
+        Returns:
+            rad/s² or m/s²; inf where it is not too fast, and in mode ``buffer``.
+        """
+        if not self.law.bound:
+            return math.inf
+        d, towards = side.sign * (side.limit - position), side.sign * speed
+        return last_command(d, towards, side.brake, self.k1)
+
     def commands(self, q: Array, v: Array) -> list[float]:
         """Evaluate `admissible` of every side at positions (n,) and velocities (n,)."""
         positions, speeds = q.tolist(), v.tolist()
@@ -229,7 +265,7 @@ class JointLimits(KnownAttributes):
         """Whether a subclass has a law of its own, which only the readable tick can call."""
         return any(
             getattr(type(self), name) is not getattr(JointLimits, name)
-            for name in ("admissible", "presence", "margin")
+            for name in ("admissible", "presence", "margin", "stopping", "last")
         )
 
 
