@@ -1,5 +1,7 @@
 """Joint limits: the guarantee, the law of insertion, and continuity."""
 
+import math
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -7,8 +9,9 @@ from hypothesis import strategies as st
 
 from opspace.command import Status
 from opspace.controller import Controller, ReferenceController
+from opspace.controller.limit_task_sets import braking
 from opspace.errors import InputError, UnknownNameError
-from opspace.law.scalars import allowed_speed
+from opspace.law.scalars import LIMIT_LAWS, allowed_speed, last_command, stopping_command
 from opspace.loop import simulate
 from opspace.robots import load_robot
 from opspace.sim import Plant
@@ -49,6 +52,39 @@ def test_a_joint_that_obeys_never_passes_its_limit(seed, brake, room, fraction, 
         q += v * DT
         assert sign * (q - 0.7) <= 1e-9
     assert hardest <= 1.1 * brake + 1e-9
+
+
+@settings(max_examples=300)
+@given(st.floats(2.0, 50.0), st.floats(0.0, 1.0), st.floats(0.0, 1.0))
+def test_who_is_not_too_fast_need_not_hurry(brake, room, fraction):
+    allowed, _ = allowed_speed(room, brake, JointLimits.k1)
+    slow = min(fraction * allowed, allowed)
+    assert stopping_command(room, slow, brake, 1e9, JointLimits.k1, DT) == math.inf
+    assert last_command(room, slow, brake, JointLimits.k1) == math.inf
+    # Where hurry begins it asks for no more than the curve does.
+    barely = allowed * (1.0 + 1e-9) + 1e-12
+    hurried = stopping_command(room, barely, brake, 1e9, JointLimits.k1, DT)
+    curve = LIMIT_LAWS["admissible"].command(
+        room, barely, brake, math.inf, JointLimits.k1, JointLimits.k2, 0.0, 0.0
+    )
+    assert hurried >= curve - 1e-6 * (1.0 + abs(curve))
+
+
+@settings(max_examples=300)
+@given(st.floats(2.0, 50.0), st.floats(1e-4, 0.5), st.floats(0.0, 4.0), st.booleans())
+def test_a_joint_that_is_too_fast_stops_where_its_motor_can_stop_it(brake, room, speed, exact):
+    """Whether v ends the tick before the position moves, or the acceleration is integrated exactly."""
+    side, limits = Side("joint", 0, 1.0, 0.0, brake), JointLimits()
+    speed = min(speed, 0.9 * room / DT)
+    most = 1.1 * speed * speed / (2.0 * max(room - speed * DT, 0.1 * room))
+    q, v, passed = -room, speed, -room
+    for _ in range(1500):
+        a = limits.admissible(side, q, v)
+        a = min(a, limits.hurry(side, q, v, most, DT)[0])
+        q += DT * (v + (0.5 if exact else 1.0) * DT * a)
+        v += DT * a
+        passed = max(passed, q)
+    assert passed <= 1e-4
 
 
 @settings(max_examples=300)
@@ -100,7 +136,10 @@ def test_the_joint_gets_the_smaller_of_wish_and_admissible(robot, seed, distance
     command = limited.step(0.0, q, v)
     got = joint_acceleration(robot, q, v, command.tau)[0]
     side = next(s for s in limits.sides if s.name == "joint1/upper")
-    admissible = limits.admissible(side, q[0], v[0])
+    most = braking(robot.M, robot.bias, robot.torque_limit)[0]
+    admissible = min(
+        limits.admissible(side, q[0], v[0]), limits.hurry(side, q[0], v[0], most, 0.0)[0]
+    )
     assert got == pytest.approx(min(wish, admissible), abs=1e-6 * (1 + abs(wish)))
     if wish > admissible:
         assert command.limits["joint1/upper"] > 0.0

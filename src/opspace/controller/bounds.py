@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from opspace.command import Status
 from opspace.controller.limit_task_sets import LimitTerms
 from opspace.law import BROKEN, LOST, Nearest, excess, nearest_acceleration
+from opspace.robots.protocol import Robot
 
 
 @dataclass(frozen=True)
@@ -34,13 +35,42 @@ class Bounds:
 
     def __post_init__(self) -> None:
         lower, upper = np.full(self.bias.size, -np.inf), np.full(self.bias.size, np.inf)
+        haste = np.zeros((2, self.bias.size))
         for term in self.terms:
+            haste[int(term.side.sign > 0.0), term.side.index] = term.haste
             if term.side.sign > 0.0:
                 upper[term.side.index] = term.command
             else:
                 lower[term.side.index] = -term.command
+        # Who must stop at once may do so, whatever the speed limit behind it would say.
+        apart = np.maximum(lower - upper, 0.0)
+        lower, upper = lower - np.minimum(haste[1], apart), upper + np.minimum(haste[0], apart)
         object.__setattr__(self, "lower", lower)
         object.__setattr__(self, "upper", upper)
+
+    def near(self, acceleration: np.ndarray) -> bool:
+        """Tell whether a limit acts or would act if its joint did more by its margin."""
+        return any(
+            term.side.sign * acceleration[term.side.index] > term.command - term.margin
+            for term in self.terms
+        )
+
+    def after(self, change: np.ndarray) -> Bounds:
+        """Return what may be asked for when accelerations go on to change, (n,) rad/s².
+
+        What a joint does more towards its limit is taken off, up to the margin of the limit.
+        """
+        terms: list[LimitTerms] = []
+        for term in self.terms:
+            more = term.side.sign * float(change[term.side.index])
+            terms.append(term._replace(command=term.command - min(max(more, 0.0), term.margin)))
+        return replace(self, terms=terms)
+
+    def lost(self, acceleration: np.ndarray) -> bool:
+        """Tell whether a joint does more than it may, or will pass its limit."""
+        if excess(acceleration, self.lower, self.upper) > LOST:
+            return True
+        return any(t.side.sign * acceleration[t.side.index] > t.last for t in self.terms)
 
     def broken(self, tau: np.ndarray, acceleration: np.ndarray) -> bool:
         """Tell whether a torque or its acceleration is outside."""
@@ -65,7 +95,7 @@ def realise(
     M, bias = bounds.M, bounds.bias
     acceleration = np.linalg.solve(M, tau - bias)
     if not bounds.broken(tau, acceleration):
-        return tau, Status.OK, {}
+        return tau, Status.LIMIT_LOST if bounds.lost(acceleration) else Status.OK, {}
     found = nearest_acceleration(
         np.linalg.cholesky(M),
         metric(),
@@ -79,9 +109,30 @@ def realise(
     status = Status.FILTERED
     if found.motors:
         status |= Status.TORQUE_SCALED
-    if excess(found.acceleration, bounds.lower, bounds.upper) > LOST:
+    if bounds.lost(found.acceleration):
         status |= Status.LIMIT_LOST
     return tau, status, _acting(bounds.terms, found)
+
+
+def change_within_tick(
+    robot: Robot, tau: np.ndarray, acceleration: np.ndarray, period: float
+) -> np.ndarray:
+    """Tell by how much accelerations differ in the middle of a tick, while the torque stays.
+
+    Args:
+        robot: The robot at the beginning; it is there again in the end.
+        tau: (n,) torque, N·m.
+        acceleration: (n,) q̈ at the beginning, rad/s².
+        period: Δt, s.
+
+    Returns:
+        (n,) A⁻¹ (Γ − b − g) at q + q̇ Δt/2 + q̈ Δt²/8, q̇ + q̈ Δt/2, less q̈, rad/s².
+    """
+    q, v, half = np.array(robot.q), np.array(robot.v), 0.5 * period
+    robot.update(q + half * (v + 0.5 * half * acceleration), v + half * acceleration)
+    later = np.linalg.solve(robot.M, tau - robot.bias)
+    robot.update(q, v)
+    return later - acceleration
 
 
 def _acting(terms: Sequence[LimitTerms], found: Nearest) -> dict[str, float]:

@@ -21,6 +21,7 @@ from opspace.kernels.columns import (
     DAMPING,
     KEEP_TORQUE,
     OPTION_SIZE,
+    PERIOD,
     REACH,
     RELEASE_UPPER,
     ROOM,
@@ -356,6 +357,7 @@ class Controller(ReferenceController):
         option[DAMPING] = self.damping
         option[TASK_BIAS] = float(self.bias == "task")
         option[ROOM], option[REACH] = self._blending.room, self._blending.reach
+        option[PERIOD] = self._rules.period
         option[KEEP_TORQUE] = float(self.torque_limits == "priority")
         return option
 

@@ -141,6 +141,7 @@ class ReferenceController:
             self._scales,
             stack.limits,
             self._observer,
+            0.0 if period is None else float(period),
         )
 
     def _paced(self, period: float) -> Callable[[Task], None]:

@@ -9,9 +9,14 @@ from typing import NamedTuple
 import numpy as np
 
 from opspace.command import Found, Status
-from opspace.controller.bounds import Bounds, realise
+from opspace.controller.bounds import Bounds, change_within_tick, realise
 from opspace.controller.disturbance import DisturbanceObserver
-from opspace.controller.limit_task_sets import LimitTerms, limit_task_sets, limit_terms
+from opspace.controller.limit_task_sets import (
+    LimitTerms,
+    braking,
+    limit_task_sets,
+    limit_terms,
+)
 from opspace.controller.reference_report import level_status, task_status
 from opspace.errors import InputError
 from opspace.law import (
@@ -86,6 +91,7 @@ class Rules:
         scales: References of σ.
         limits: Joint limits, None for none.
         observer: Of what the model does not explain; None trusts the model.
+        period: Time between two ticks, in which accelerations change, s; 0 where it is not known.
     """
 
     law: Law
@@ -96,6 +102,7 @@ class Rules:
     scales: Scales
     limits: JointLimits | None
     observer: DisturbanceObserver | None
+    period: float
 
 
 @dataclass(frozen=True)
@@ -270,7 +277,8 @@ def begin_limits(k: Given) -> list[LimitTerms]:
         return []
     if observer is not None:
         observer.observe(k.t, k.v)
-    return limit_terms(limits, k.q, k.v, observer and observer.acceleration)
+    most = braking(k.M, k.bias, k.torque_limit)
+    return limit_terms(limits, k.q, k.v, most, k.rules.period, observer and observer.acceleration)
 
 
 def insert_limits(k: Given) -> dict[int, float]:
@@ -305,7 +313,12 @@ def keep_bounds(
     keeps = limits if rules.limits is not None and rules.limits.law.bound else []
     if keeps or rules.keep_torque:
         room = k.torque_limit if rules.keep_torque else np.full(k.v.size, np.inf)
-        tau, kept, acting = realise(Bounds(keeps, k.M, k.bias, room), tau, lambda: metric(L, tasks))
+        bounds, wanted = Bounds(keeps, k.M, k.bias, room), tau
+        tau, kept, acting = realise(bounds, wanted, lambda: metric(L, tasks))
+        acceleration = np.linalg.solve(k.M, tau - k.bias)
+        if rules.period > 0.0 and k.q.size == k.v.size and bounds.near(acceleration):
+            change = change_within_tick(k.robot, tau, acceleration, rules.period)
+            tau, kept, acting = realise(bounds.after(change), wanted, lambda: metric(L, tasks))
     if observer is not None:
         observer.remember(k.t, k.v, np.linalg.solve(k.M, tau - k.bias))
     return tau, kept, acting

@@ -69,8 +69,9 @@ VARIABLE_SIZE = 9
     LIMIT_BOUND,
     LIMIT_BUFFER,
     KEEP_TORQUE,
-) = range(19)
-OPTION_SIZE = 19
+    PERIOD,
+) = range(20)
+OPTION_SIZE = 20
 
 # What a tick answers when there is no torque.
 STATE_NOT_FINITE, NOT_FINITE, NOT_POSITIVE_DEFINITE = -1, -2, -3

@@ -1,5 +1,8 @@
-"""Columns of ``Tick.limit``: side, rad, rad/s², rad/s², rad/s², rad/s, rad/s²."""
+"""Columns of ``Tick.limit``.
+
+Side, rad, rad/s², rad/s², rad/s², rad/s, rad/s², then rad/s² as the others.
+"""
 
 from __future__ import annotations
 
-SIGN, POSITION, BRAKE, MARGIN, COMMAND, SPEED, DISTURBANCE = range(7)
+SIGN, POSITION, BRAKE, MARGIN, COMMAND, SPEED, DISTURBANCE, HASTE, LAST, SHIFT = range(10)

@@ -14,15 +14,25 @@ from opspace.kernels.columns import (
     LIMIT_KP,
     LIMIT_LAW,
     LIMIT_PROFILE,
+    PERIOD,
 )
-from opspace.kernels.compiled_scalars import limit_command, limit_presence
-from opspace.kernels.inertia import acceleration_of, whiten
+from opspace.kernels.compiled_scalars import (
+    last_command,
+    limit_command,
+    limit_presence,
+    stopping_command,
+)
+from opspace.kernels.dynamics import evaluate
+from opspace.kernels.inertia import acceleration_of, factor, whiten
 from opspace.kernels.limit_columns import (
     BRAKE,
     COMMAND,
     DISTURBANCE,
+    HASTE,
+    LAST,
     MARGIN,
     POSITION,
+    SHIFT,
     SIGN,
     SPEED,
 )
@@ -53,7 +63,31 @@ def begin_limits(work):
             option[LIMIT_KP],
             option[LIMIT_BUFFER],
         )
+        limit[HASTE], limit[LAST], limit[SHIFT] = 0.0, math.inf, 0.0
+        if option[LIMIT_BOUND] != 0.0:
+            stop(work, limit, j)
         limit[COMMAND] -= limit[DISTURBANCE]
+
+
+@jit
+def stop(work, limit, j):
+    """Ask more of a joint that is too fast, as much as its motors give while they hold the others."""
+    k1, period = work.option[LIMIT_K1], work.option[PERIOD]
+    d, towards = limit[SIGN] * (limit[POSITION] - work.q[j]), limit[SIGN] * work.v[j]
+    if towards <= 0.0:
+        return
+    if stopping_command(d, towards, limit[BRAKE], math.inf, k1, period) == math.inf:
+        return
+    limit[LAST] = last_command(d, towards, limit[BRAKE], k1)
+    most = math.inf
+    for a in range(work.v.shape[0]):
+        if work.M[a, j] != 0.0:
+            room = max(work.torque_limit[a] - abs(work.bias[a]), 0.0)
+            most = min(most, room / abs(work.M[a, j]))
+    command = stopping_command(d, towards, limit[BRAKE], most, k1, period)
+    if command < limit[COMMAND]:
+        limit[HASTE] = limit[COMMAND] - command
+        limit[COMMAND] = command
 
 
 @jit
@@ -103,10 +137,33 @@ def keep_bounds(work, stacks):
         x[a] = work.tau[a] - work.bias[a]
     whiten(work.inertia, x)
     acceleration_of(work.inertia, x)
+    for a in range(n):
+        work.wanted_acceleration[a], work.wanted_tau[a] = x[a], work.tau[a]
+    kept = realise(work, stacks, n)
+    if (
+        work.option[PERIOD] > 0.0
+        and work.option[LIMIT_BOUND] != 0.0
+        and _near(work)
+        and look_ahead(work, n)
+    ):
+        for a in range(n):
+            x[a], work.tau[a] = work.wanted_acceleration[a], work.wanted_tau[a]
+        kept = realise(work, stacks, n)
+    return kept
+
+
+@jit
+def realise(work, stacks, n):
+    """Replace a torque and its acceleration by the nearest that the bounds allow.
+
+    Returns:
+        What happened, in the numbers of `opspace.Status`.
+    """
     _bounds(work, n)
     if not (_motors_exceeded(work, n) or _excess(work, n) > BROKEN):
-        return 0
+        return LIMIT_LOST if _will_pass(work) else 0
     task_metric(work, stacks)
+    x = work.joint_acceleration
     nearest_acceleration(work.inertia, x, work.bounds)
     for a in range(n):
         work.tau[a] = work.bias[a]
@@ -130,9 +187,30 @@ def _acting(work, n):
     for a in range(2 * n, 4 * n):
         if taken[a] > 0.0:
             bits |= SCALED
-    if _excess(work, n) > LOST:
+    if _excess(work, n) > LOST or _will_pass(work):
         bits |= LIMIT_LOST
     return bits
+
+
+@jit
+def _will_pass(work):
+    """Whether a joint that is too fast does not brake enough to stop at its limit."""
+    for i in range(work.limit.shape[0]):
+        limit = work.limit[i]
+        if limit[SIGN] * work.joint_acceleration[work.limit_joint[i]] > limit[LAST]:
+            return True
+    return False
+
+
+@jit
+def _near(work):
+    """Whether a limit acts, or would act if its joint did more by its margin."""
+    for i in range(work.limit.shape[0]):
+        limit = work.limit[i]
+        towards = limit[SIGN] * work.joint_acceleration[work.limit_joint[i]]
+        if towards > limit[COMMAND] - limit[MARGIN]:
+            return True
+    return False
 
 
 @jit
@@ -173,6 +251,43 @@ def _bounds(work, n):
     for i in range(work.limit.shape[0]):
         limit, j = work.limit[i], work.limit_joint[i]
         if limit[SIGN] > 0.0:
-            bounds.upper[j] = limit[COMMAND]
+            bounds.upper[j] = limit[COMMAND] - limit[SHIFT]
         else:
-            bounds.lower[j] = -limit[COMMAND]
+            bounds.lower[j] = limit[SHIFT] - limit[COMMAND]
+    for i in range(work.limit.shape[0]):
+        # Who must stop at once may do so, whatever the speed limit behind it would say.
+        limit, j = work.limit[i], work.limit_joint[i]
+        apart = bounds.lower[j] - bounds.upper[j]
+        if apart > 0.0 and limit[SIGN] > 0.0:
+            bounds.lower[j] -= min(limit[HASTE], apart)
+        elif apart > 0.0:
+            bounds.upper[j] += min(limit[HASTE], apart)
+
+
+@jit
+def look_ahead(work, n):
+    """Take off what joints do more towards their limits in the middle of the tick, up to the margin.
+
+    Constant torque does not give constant acceleration. Reads joint_acceleration (n,) and tau (n,),
+    writes later and the column SHIFT of limit.
+
+    Returns:
+        Whether that can be computed here.
+    """
+    if work.bodies.kind.shape[0] == 0 or work.q.shape[0] != n:
+        return False
+    half, x, change = 0.5 * work.option[PERIOD], work.joint_acceleration, work.change
+    for a in range(n):
+        work.later_q[a] = work.q[a] + half * (work.v[a] + 0.5 * half * x[a])
+        work.later_v[a] = work.v[a] + half * x[a]
+    evaluate(work.bodies, work.later_q, work.later_v, work.later)
+    if not factor(work.later.M, work.later_inertia):
+        return False
+    for a in range(n):
+        change[a] = work.tau[a] - work.later.bias[a]
+    whiten(work.later_inertia, change)
+    acceleration_of(work.later_inertia, change)
+    for i in range(work.limit.shape[0]):
+        limit, j = work.limit[i], work.limit_joint[i]
+        limit[SHIFT] = min(max(limit[SIGN] * (change[j] - x[j]), 0.0), limit[MARGIN])
+    return True

@@ -14,6 +14,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+UNBOUNDED = 1e30
+"""Bounds beyond are none."""
+
 # --- Activation profiles h(s) between s = 0 and s = 1, see `opspace.Profile` -------------------------
 
 PROFILES = ("linear", "cubic", "quintic", "half-sine", "tanh", "step")
@@ -172,6 +175,16 @@ def spread(y: float) -> tuple[float, float]:
 RETURN_SPEED = 0.5
 """Speed at which a joint that is outside its limits is brought back, rad/s or m/s."""
 
+CREEP = 2e-4
+"""Speed below which nobody hurries, because it may be noise, rad/s or m/s."""
+USUAL_PERIOD = 1e-3
+"""Time between two ticks where none is given, s."""
+
+PASSED = 5e-6
+"""What lies less than this beyond a limit has not passed it, rad or m."""
+TOO_FAST = 5e-5
+"""A joint that is too fast by less loses it before it passes its limit by more, rad/s or m/s."""
+
 ADMISSIBLE, BUFFER = range(2)
 
 
@@ -216,6 +229,22 @@ class LimitLaw(NamedTuple):
         """Evaluate the activation of every limit, with the profile of this code."""
         return [self.presence(d, towards, brake, buffer, code) for d, towards, brake, _ in joints]
 
+    def hurries(
+        self, joints: Sequence[Approach], most: Sequence[float], k1: float, period: float
+    ) -> list[tuple[float, float]]:
+        """Evaluate `stopping_command` and `last_command` of every limit that is a bound."""
+        if not self.bound:
+            return [(math.inf, math.inf)] * len(joints)
+        return [
+            (
+                stopping_command(d, towards, brake, braking, k1, period),
+                last_command(d, towards, brake, k1),
+            )
+            if towards > 0.0
+            else (math.inf, math.inf)
+            for (d, towards, brake, _), braking in zip(joints, most, strict=True)
+        ]
+
 
 def allowed_speed(d: float, brake: float, k1: float) -> tuple[float, float]:
     """Evaluate v_adm(d), from which a joint still stops within d, and its slope dv_adm/dd."""
@@ -236,6 +265,34 @@ def admissible_command(
     """Evaluate q̈_adm at distance d and speed ``towards``, for the largest speed ``most``."""
     allowed, slope = allowed_speed(d, brake, k1)
     return min(-towards * slope + k2 * (allowed - towards), k2 * (most - towards))
+
+
+def stopping_command(
+    d: float, towards: float, brake: float, most: float, k1: float, period: float
+) -> float:
+    """Evaluate what a joint may do that is faster than v_adm(d), inf where it is not.
+
+        q̈ ≤ −min(v_adm' v² / (v_adm + v_adm' v Δt/2), most)
+
+    Without Δt the joint would stop within v_adm/2 v_adm', which is no more than d: it has to brake at
+    once and can let go later. Δt keeps the ratio of v to d from tick to tick, and v from changing its
+    sign. ``most`` is what can be had, twice the brake where nothing says so.
+    """
+    allowed, slope = allowed_speed(d, brake, k1)
+    if towards <= max(allowed, 0.0):
+        return math.inf
+    slope = slope if d >= 0.0 else k1
+    ahead = max(allowed, 0.0) + 0.5 * slope * towards * (period if period > 0.0 else USUAL_PERIOD)
+    need = slope * towards * towards / (ahead + CREEP)
+    return -min(need, most if most < UNBOUNDED else 2.0 * brake)
+
+
+def last_command(d: float, towards: float, brake: float, k1: float) -> float:
+    """Evaluate the most with which a joint that is too fast still does not pass, inf where it is not."""
+    allowed, _ = allowed_speed(d, brake, k1)
+    if not math.isfinite(d) or towards <= max(allowed, 0.0) + TOO_FAST:
+        return math.inf
+    return -towards * towards / (2.0 * (max(d, 0.0) + PASSED))
 
 
 def admissible_presence(
@@ -403,8 +460,6 @@ BROKEN = 1e-9
 """A bound is broken by more than this part of itself, or by more than this."""
 LOST = 1e-3
 """A bound that is still broken by more than this part of itself, or by more than this, is lost."""
-UNBOUNDED = 1e30
-"""Bounds beyond are none."""
 
 
 def room_for(part: np.ndarray, torque: np.ndarray, limit: np.ndarray) -> float:

@@ -91,6 +91,7 @@ def make_tick(
     space = {"inertia": inertia, "limit": limit, **SPACE.reported(sizes, block)}
     given = {
         **{name: getattr(axes, name) for name in ("q", "v", "M", "bias", "axes", "placement")},
+        "later_q": np.zeros(axes.q.size),
         "parent": np.array(axes.parent, np.int64),
         "mass_place": axes.masses.place,
         "mass": axes.masses.points,
@@ -100,6 +101,8 @@ def make_tick(
         "space": SPACE.make(sizes, space),
         "bodies": axes.bodies,
         "dynamics": axes.dynamics,
+        "later": axes.later,
+        "later_inertia": make_inertia(_before(axes)),
         "bounds": BOUNDS.make(sizes),
     }
     return TICK.make(sizes, {**kept, **given}), block.memory

@@ -65,6 +65,7 @@ class MotionAxes:
         bodies: `RIGID_BODIES` that compiled code computes the dynamics from; none where the
             robot's library does.
         dynamics: `DYNAMICS`, where it computes them.
+        later: `DYNAMICS`, the same at another state.
     """
 
     q: np.ndarray
@@ -78,3 +79,4 @@ class MotionAxes:
     masses: Masses
     bodies: Record = field(default_factory=no_bodies)
     dynamics: Record = field(default_factory=lambda: make_dynamics(no_bodies()))
+    later: Record = field(default_factory=lambda: make_dynamics(no_bodies()))

@@ -13,7 +13,7 @@ import numpy as np
 import pinocchio as pin
 
 from opspace.machine.field_table import Record
-from opspace.robots.bodies import RIGID_BODIES
+from opspace.robots.bodies import RIGID_BODIES, make_dynamics
 from opspace.robots.description import Springs
 from opspace.robots.joint_kinds import ALIGNED, BALL, HINGE, SLIDE, TRANSLATION
 from opspace.robots.motion_axes import FramePlace, MassPoint, MotionAxes
@@ -54,6 +54,7 @@ class RigidModel:
             masses=self.masses,
             bodies=self.bodies,
             dynamics=dynamics,
+            later=make_dynamics(self.bodies),
         )
 
 

@@ -210,6 +210,26 @@ class JointLimits(KnownAttributes):
         code = PROFILES.index(self.profile)
         return self.law.presence(d, towards, side.brake, self.buffer, code)
 
+    def hurry(
+        self, side: Side, position: float, speed: float, most: float, period: float
+    ) -> tuple[float, float]:
+        """What a joint that is too fast may do, and must do to stop at its limit.
+
+        Args:
+            side: The limit.
+            position: Joint position, rad or m.
+            speed: Joint velocity, rad/s or m/s.
+            most: Braking that the motors can give now, rad/s² or m/s²; inf where that is not known.
+            period: Time between two ticks, s; 0 where it is not known.
+
+        Returns:
+            Acceleration towards the limit that it may have, and the largest with which it does not
+            pass, rad/s² or m/s²; inf where it is not too fast, and in mode ``buffer``.
+        """
+        d, towards = side.sign * (side.limit - position), side.sign * speed
+        approach = Approach(d, towards, side.brake, side.speed)
+        return self.law.hurries([approach], [most], self.k1, period)[0]
+
     def commands(self, q: Array, v: Array) -> list[float]:
         """Evaluate `admissible` of every side at positions (n,) and velocities (n,)."""
         if self.overridden:
@@ -222,6 +242,17 @@ class JointLimits(KnownAttributes):
             return [self.presence(s, float(q[s.index]), float(v[s.index])) for s in self.sides]
         code = PROFILES.index(self.profile)
         return self.law.presences(self._approaches(q, v), self.buffer, code)
+
+    def hurries(self, q: Array, v: Array, most: Array, period: float) -> list[tuple[float, float]]:
+        """Evaluate `hurry` of every side at positions, velocities and for braking, (n,) each."""
+        braking = most.tolist()
+        if self.overridden:
+            return [
+                self.hurry(s, float(q[s.index]), float(v[s.index]), braking[s.index], period)
+                for s in self.sides
+            ]
+        given = [braking[s.index] for s in self.sides]
+        return self.law.hurries(self._approaches(q, v), given, self.k1, period)
 
     def margins(self) -> list[float]:
         """Evaluate `margin` of every side."""
@@ -245,7 +276,7 @@ class JointLimits(KnownAttributes):
         """Whether a subclass has a law of its own, which only the readable tick can call."""
         return any(
             getattr(type(self), name) is not getattr(JointLimits, name)
-            for name in ("admissible", "presence", "margin")
+            for name in ("admissible", "presence", "margin", "hurry")
         )
 
 
