@@ -25,9 +25,7 @@ from numba.np.arrayobj import make_array, populate_array
 from numba.np.numpy_support import from_dtype
 
 from opspace.machine.field_table import RecordTable
-from opspace.machine.record import Handle
-
-WORD = 8
+from opspace.machine.record import WORD, Handle
 
 
 class HandleType(types.Type):

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+WORD = 8
 WORDS = (np.dtype(np.float64), np.dtype(np.int64))
 
 
