@@ -58,7 +58,8 @@ def driven_into_limits(observer_time, clearance=0.01, kind=osc.Controller, durat
 @pytest.mark.parametrize("seed", [1, 4, 7])
 def test_limits_hold_with_wrong_masses_only_where_they_learn(seed):
     trusting, learning = (
-        driven_into_limits(time, mass_error=0.25, seed=seed)[0] for time in (None, 0.01)
+        driven_into_limits(time, clearance=0.0, mass_error=0.25, seed=seed)[0]
+        for time in (None, 0.01)
     )
     assert trusting > 1e-3
     assert learning < 0.0
