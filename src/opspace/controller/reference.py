@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from opspace.command import Command, Found, Status
+from opspace.controller.changing_payload import Loading
 from opspace.controller.disturbance import DisturbanceObserver
 from opspace.controller.drivable import check_drivable
 from opspace.controller.handover import Handover
 from opspace.controller.integral import IntegralAction
-from opspace.controller.loading import Loading
 from opspace.controller.rates import check_damping, check_limits, with_period
 from opspace.controller.stages import Given, Law, Rules, sum_of_hard_torques, tick
 from opspace.controller.watchdog import Watchdog

@@ -15,7 +15,7 @@ BASE_JOINT = "floating_base"
 
 
 @dataclass(frozen=True)
-class Origin:
+class ModelOrigin:
     """Where a model comes from; as text it is what errors call it.
 
     Attributes:
@@ -31,7 +31,7 @@ class Origin:
     file: Path | None = None
 
     @classmethod
-    def of(cls, path: Path) -> Origin:
+    def of(cls, path: Path) -> ModelOrigin:
         """Return that of a file."""
         return cls(str(path), path.name, path.stem, path)
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from opspace.errors import ModelError
-from opspace.robots.description import Origin
+from opspace.robots.description import ModelOrigin
 from opspace.robots.joint_roles import JointChoice
 from opspace.robots.loading import RobotFile, robot_of_mjcf, robot_of_urdf
 
@@ -57,6 +57,6 @@ def _mujoco(model: Any, kind: str, floating_base: bool, choice: JointChoice) -> 
 
     compiled = kind == "MjModel"
     name = model.names.split(b"\0")[0].decode() if compiled else model.modelname
-    origin = Origin(f"{kind} {name!r}", name or "the model", name or "robot")
+    origin = ModelOrigin(f"{kind} {name!r}", name or "the model", name or "robot")
     spec = spec_of(model, origin) if compiled else model.copy()
     return reduce_spec(spec, origin, floating_base, choice)

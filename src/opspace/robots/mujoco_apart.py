@@ -11,14 +11,14 @@ import mujoco
 import numpy as np
 
 from opspace.errors import ModelError
-from opspace.robots.description import Origin
+from opspace.robots.description import ModelOrigin
 from opspace.robots.mujoco_motors import ON_JOINT
 from opspace.robots.mujoco_names import WIDTHS, joint_names, key_names
 
 INSTEAD = "give the MjSpec, or the file, that it was compiled from"
 
 
-def spec_of(model: mujoco.MjModel, origin: Origin) -> mujoco.MjSpec:
+def spec_of(model: mujoco.MjModel, origin: ModelOrigin) -> mujoco.MjSpec:
     """Write down a compiled model: bodies, joints, sites, what drives and binds them, key frames.
 
     Shapes are left out; what they weigh is in the bodies.
@@ -107,7 +107,7 @@ def _set_curve(target: object, what: str, model: mujoco.MjModel, of: str, i: int
 
 
 def _copy_tendon(
-    spec: mujoco.MjSpec, model: mujoco.MjModel, t: int, names: tuple[str, ...], origin: Origin
+    spec: mujoco.MjSpec, model: mujoco.MjModel, t: int, names: tuple[str, ...], origin: ModelOrigin
 ) -> None:
     name = model.tendon(t).name or f"tendon{t}"
     first = int(model.tendon_adr[t])
@@ -126,7 +126,7 @@ def _copy_tendon(
 
 
 def _copy_actuator(
-    spec: mujoco.MjSpec, model: mujoco.MjModel, i: int, names: tuple[str, ...], origin: Origin
+    spec: mujoco.MjSpec, model: mujoco.MjModel, i: int, names: tuple[str, ...], origin: ModelOrigin
 ) -> None:
     name = model.actuator(i).name or f"actuator{i}"
     kind, target = int(model.actuator_trntype[i]), int(model.actuator_trnid[i, 0])
@@ -160,7 +160,7 @@ def _copy_actuator(
 
 
 def _copy_equality(
-    spec: mujoco.MjSpec, model: mujoco.MjModel, e: int, names: tuple[str, ...], origin: Origin
+    spec: mujoco.MjSpec, model: mujoco.MjModel, e: int, names: tuple[str, ...], origin: ModelOrigin
 ) -> None:
     kind, ends = int(model.eq_type[e]), (int(model.eq_obj1id[e]), int(model.eq_obj2id[e]))
     name, what = model.equality(e).name or f"equality{e}", int(model.eq_objtype[e])

@@ -11,10 +11,10 @@ from pathlib import Path
 import mujoco
 
 from opspace.errors import ModelError
-from opspace.robots.description import Origin
+from opspace.robots.description import ModelOrigin
 
 
-def drop_missing(spec: mujoco.MjSpec, origin: Origin) -> tuple[str, ...]:
+def drop_missing(spec: mujoco.MjSpec, origin: ModelOrigin) -> tuple[str, ...]:
     """Take out shapes whose mesh file is missing, and paint plain what has no picture.
 
     Args:

@@ -14,7 +14,7 @@ import numpy as np
 
 from opspace.errors import ModelError
 from opspace.robots.adapter import held_joints
-from opspace.robots.description import BASE_JOINT, WORLD, Description, Origin, mid_range
+from opspace.robots.description import BASE_JOINT, WORLD, Description, ModelOrigin, mid_range
 from opspace.robots.joint_roles import (
     ALL_WITH_A_MOTOR,
     JointChoice,
@@ -61,7 +61,7 @@ class MjcfRobot(NamedTuple):
     """
 
     spec: mujoco.MjSpec
-    origin: Origin
+    origin: ModelOrigin
     roles: JointRoles
     held: frozenset[int]
     warnings: tuple[str, ...]
@@ -93,7 +93,7 @@ def mujoco_model(
         ModelError: MuJoCo cannot use the file.
     """
     path = Path(source)
-    origin = Origin.of(path)
+    origin = ModelOrigin.of(path)
     if path.suffix == ".urdf":
         urdf = read_urdf(path, locked_joints, floating_base)
         spec = urdf_spec(urdf, floating_base)
@@ -146,7 +146,7 @@ def mjcf_spec(path: Path, floating_base: bool, choice: JointChoice = ALL_WITH_A_
     """
     if not path.is_file():
         raise ModelError(f"{path}: no such file")
-    origin = Origin.of(path)
+    origin = ModelOrigin.of(path)
     try:
         spec = mujoco.MjSpec.from_file(str(path))
     except (ValueError, RuntimeError) as error:
@@ -156,7 +156,7 @@ def mjcf_spec(path: Path, floating_base: bool, choice: JointChoice = ALL_WITH_A_
 
 def reduce_spec(
     spec: mujoco.MjSpec,
-    origin: Origin,
+    origin: ModelOrigin,
     floating_base: bool,
     choice: JointChoice,
 ) -> MjcfRobot:
@@ -223,7 +223,7 @@ def urdf_spec(urdf: Urdf, floating_base: bool) -> mujoco.MjSpec:
     return spec
 
 
-def compile_spec(spec: mujoco.MjSpec, origin: Origin) -> mujoco.MjModel:
+def compile_spec(spec: mujoco.MjSpec, origin: ModelOrigin) -> mujoco.MjModel:
     """Compile a specification.
 
     Args:
@@ -339,18 +339,18 @@ def _middle(model: mujoco.MjModel, lower: np.ndarray, upper: np.ndarray) -> np.n
     return q
 
 
-def _refused(origin: Origin, error: Exception) -> ModelError:
+def _refused(origin: ModelOrigin, error: Exception) -> ModelError:
     return ModelError(f"{origin}: MuJoCo cannot use it: {' '.join(str(error).split())}")
 
 
-def _free(root: mujoco.MjsBody, origin: Origin) -> None:
+def _free(root: mujoco.MjsBody, origin: ModelOrigin) -> None:
     if root.joints:
         name = root.joints[0].name
         raise ModelError(f"{origin}: root body {root.name!r} has joint {name!r} and cannot float")
     root.add_freejoint(name=BASE_JOINT)
 
 
-def _free_mjcf(spec: mujoco.MjSpec, origin: Origin) -> None:
+def _free_mjcf(spec: mujoco.MjSpec, origin: ModelOrigin) -> None:
     roots = [body for body in spec.worldbody.bodies if body.joints or body.bodies]
     if len(roots) != 1:
         raise ModelError(f"{origin}: a floating base needs one root body, not {len(roots)}")

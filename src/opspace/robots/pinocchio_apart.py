@@ -15,7 +15,7 @@ import numpy as np
 import pinocchio as pin
 
 from opspace.errors import ModelError
-from opspace.robots.description import Description, Origin, unused
+from opspace.robots.description import Description, ModelOrigin, unused
 from opspace.robots.joint_roles import JointChoice
 from opspace.robots.pinocchio_model import inertia_on_world
 from opspace.robots.urdf import MOMENTS, Urdf, describe_urdf, limit_warnings, reduce_urdf
@@ -49,7 +49,7 @@ def urdf_of(model: Any, floating_base: bool, choice: JointChoice) -> tuple[Urdf,
         ModelError: A joint is no hinge, slide or free base, or gravity is not that of a URDF.
         UnknownNameError: No joint has a name that is asked for.
     """
-    origin = Origin(f"pinocchio.Model {model.name!r}", model.name or "the model", "robot")
+    origin = ModelOrigin(f"pinocchio.Model {model.name!r}", model.name or "the model", "robot")
     if not np.allclose(model.gravity.linear, pin.Model.gravity981):
         raise ModelError(f"{origin}: gravity other than 0 0 -9.81 m/s² is not supported")
     free = model.njoints > 1 and model.joints[1].shortname() == "JointModelFreeFlyer"
@@ -190,7 +190,7 @@ def _write_joint(
     return joint
 
 
-def _write_moving(root: ET.Element, model: Any, j: int, tree: _Tree, origin: Origin) -> None:
+def _write_moving(root: ET.Element, model: Any, j: int, tree: _Tree, origin: ModelOrigin) -> None:
     joint, name = model.joints[j], str(model.names[j])
     kind, axis = _motion(model, j, origin)
     limit = _limit(model, joint, name, kind, origin)
@@ -208,7 +208,7 @@ def _is_joint(frame: Any, j: int) -> bool:
     return frame.type == pin.FrameType.JOINT and int(frame.parentJoint) == j
 
 
-def _motion(model: Any, j: int, origin: Origin) -> tuple[str, np.ndarray]:
+def _motion(model: Any, j: int, origin: ModelOrigin) -> tuple[str, np.ndarray]:
     """Return how a joint moves in the words of a URDF, and its axis."""
     joint = model.joints[j]
     data = joint.createData()
@@ -225,7 +225,7 @@ def _motion(model: Any, j: int, origin: Origin) -> tuple[str, np.ndarray]:
     )
 
 
-def _limit(model: Any, joint: Any, name: str, kind: str, origin: Origin) -> dict[str, str]:
+def _limit(model: Any, joint: Any, name: str, kind: str, origin: ModelOrigin) -> dict[str, str]:
     limit: dict[str, str] = {}
     v, q = int(joint.idx_v), int(joint.idx_q)
     lower, upper = float(model.lowerPositionLimit[q]), float(model.upperPositionLimit[q])

@@ -15,7 +15,7 @@ from opspace.robots.description import (
     BASE_JOINT,
     WORLD,
     Description,
-    Origin,
+    ModelOrigin,
     mid_range,
     unused,
 )
@@ -76,7 +76,7 @@ class Urdf:
     """A URDF reduced to its kinematics and inertias, joints in depth-first order."""
 
     name: str
-    origin: Origin
+    origin: ModelOrigin
     root: str
     links: dict[str, ET.Element | None]
     joints: tuple[UrdfJoint, ...]
@@ -110,11 +110,11 @@ def read_urdf(
         UnknownNameError: A joint that is asked for or followed is not in the file.
     """
     choice = JointChoice.of(joints, locked)
-    return reduce_urdf(_parse(path), Origin.of(path), choice, floating_base)
+    return reduce_urdf(_parse(path), ModelOrigin.of(path), choice, floating_base)
 
 
 def reduce_urdf(
-    root: ET.Element, origin: Origin, choice: JointChoice, floating_base: bool = False
+    root: ET.Element, origin: ModelOrigin, choice: JointChoice, floating_base: bool = False
 ) -> Urdf:
     """Read the outermost element of a URDF; see `read_urdf`.
 
@@ -216,7 +216,7 @@ def _parse(path: Path) -> ET.Element:
     return root
 
 
-def _check_numbers(root: ET.Element, origin: Origin) -> None:
+def _check_numbers(root: ET.Element, origin: ModelOrigin) -> None:
     for owner in (*root.findall("link/inertial"), *root.findall("joint")):
         for element in owner.iter():
             for key in NUMBERS & set(element.attrib):
@@ -232,21 +232,25 @@ def _check_numbers(root: ET.Element, origin: Origin) -> None:
                     )
 
 
-def _name(element: ET.Element, origin: Origin) -> str:
+def _name(element: ET.Element, origin: ModelOrigin) -> str:
     name = element.get("name")
     if not name:
         raise ModelError(f"{origin}: a <{element.tag}> has no name")
     return name
 
 
-def _file_joints(elements: Sequence[ET.Element], origin: Origin) -> list[FileJoint]:
+def _file_joints(elements: Sequence[ET.Element], origin: ModelOrigin) -> list[FileJoint]:
     moving = {_name(e, origin): e for e in elements if e.get("type") in MOVING}
     names = [_name(e, origin) for e in elements]
     return [_file_joint(name, e, moving, names, origin) for name, e in moving.items()]
 
 
 def _file_joint(
-    name: str, element: ET.Element, moving: Collection[str], names: Sequence[str], origin: Origin
+    name: str,
+    element: ET.Element,
+    moving: Collection[str],
+    names: Sequence[str],
+    origin: ModelOrigin,
 ) -> FileJoint:
     mimic = element.find("mimic")
     if mimic is None:
@@ -261,7 +265,10 @@ def _file_joint(
 
 
 def _joint(
-    element: ET.Element, locked: Mapping[str, float | None], links: Collection[str], origin: Origin
+    element: ET.Element,
+    locked: Mapping[str, float | None],
+    links: Collection[str],
+    origin: ModelOrigin,
 ) -> UrdfJoint:
     name, kind = _name(element, origin), element.get("type", "")
     if kind not in (*MOVING, "fixed"):
@@ -304,7 +311,7 @@ def _joint(
     )
 
 
-def _largest(limit: Mapping[str, str], key: str, joint: str, origin: Origin) -> float:
+def _largest(limit: Mapping[str, str], key: str, joint: str, origin: ModelOrigin) -> float:
     """Return a limit of both directions; 0 and −1 are how files say that there is none."""
     value = float(limit.get(key, 0.0))
     if value in (0.0, -1.0):
@@ -316,7 +323,7 @@ def _largest(limit: Mapping[str, str], key: str, joint: str, origin: Origin) -> 
     return value
 
 
-def _axis(element: ET.Element, origin: Origin) -> tuple[float, ...]:
+def _axis(element: ET.Element, origin: ModelOrigin) -> tuple[float, ...]:
     tag = element.find("axis")
     text = tag.get("xyz", "1 0 0") if tag is not None else "1 0 0"
     direction = np.array(text.split(), dtype=float)
@@ -327,7 +334,7 @@ def _axis(element: ET.Element, origin: Origin) -> tuple[float, ...]:
 
 
 def _depth_first(
-    joints: dict[str, UrdfJoint], links: Collection[str], origin: Origin
+    joints: dict[str, UrdfJoint], links: Collection[str], origin: ModelOrigin
 ) -> tuple[str, tuple[UrdfJoint, ...]]:
     children = {j.child for j in joints.values()}
     roots = [link for link in links if link not in children]
