@@ -64,8 +64,9 @@ class ReferenceController:
             with in case of a fault. Unused where a posture task covers every joint.
         torque_limits: What happens to a torque above the motors' limits, see `TORQUE_LIMITS`.
         period: Time between two ticks, s, if ticks and states shall be watched: late, jumping and stale
-            ones are then reported in the status, and joint limits and gains that need more frequent
-            ticks refused. None watches nothing.
+            ones are then reported in the status, joint limits and gains that need more frequent
+            ticks refused, and joint limits count how accelerations change between two ticks. None
+            does nothing of it.
         on_time_jump: What happens when time runs backwards or jumps, see
             `opspace.controller.watchdog.POLICIES`; it needs ``period``.
         law: Torque of task sets, to compare with the library's own; see
