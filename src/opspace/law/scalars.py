@@ -180,8 +180,9 @@ CREEP = 2e-4
 USUAL_PERIOD = 1e-3
 """Time between two ticks where none is given, s."""
 
-PASSED = 5e-6
-"""What lies less than this beyond a limit has not passed it, rad or m."""
+PASSED = 5e-5
+"""A joint that will come to rest less than this beyond a limit is not told lost: measured speeds are
+noisy, rad or m."""
 TOO_FAST = 5e-5
 """A joint that is too fast by less loses it before it passes its limit by more, rad/s or m/s."""
 
