@@ -32,7 +32,8 @@ class Status(IntFlag):
     """The torque is the nearest one that keeps what every joint may do: limits pushed each other, or
     the motors."""
     LIMIT_LOST = 512
-    """No torque of the motors keeps what every joint may do; the excess is as small as can be."""
+    """No torque of the motors keeps what every joint may do, and the excess is as small as can be; or a
+    joint came too fast to be stopped at its limit."""
     HANDOVER = 1024
     """The torque is on its way from or to another controller's."""
     FAULT = 8

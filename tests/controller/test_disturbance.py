@@ -35,24 +35,32 @@ def test_ticks_far_apart_and_lost_ones_teach_nothing():
 
 
 class Reach:
-    """How far beyond its limits any joint went."""
+    """How far beyond its limits any joint went, and the ticks that called a limit lost."""
 
     def __init__(self):
         self.beyond = -np.inf
+        self.lost = []
 
     def observe(self, q, v, command):
+        if osc.Status.LIMIT_LOST in command.status:
+            self.lost.append(command.t)
         beyond = max(np.max(q - PANDA.q_upper), np.max(PANDA.q_lower - q))
         self.beyond = max(self.beyond, beyond)
 
 
-def driven_into_limits(observer_time, clearance=0.01, kind=osc.Controller, duration=2.0, **wrong):
+def driven(observer_time, clearance=0.01, kind=osc.Controller, duration=2.0, **wrong):
     limits = osc.JointLimits(clearance=clearance, observer_time=observer_time)
     posture = osc.PostureTask(PANDA.q_upper + 0.5, kp=200.0, max_speed=4.0)
     controller = kind(PANDA, osc.Stack([posture], limits=limits), torque_limits="priority")
     reach = Reach()
     plant = Plant(PANDA, PANDA.q_reference, disturbances=Disturbances(**wrong))
     assert simulate(plant, controller, duration, [reach]).completed
-    return reach.beyond, plant.q
+    return reach, plant.q
+
+
+def driven_into_limits(*given, **options):
+    reach, q = driven(*given, **options)
+    return reach.beyond, q
 
 
 @pytest.mark.parametrize("seed", [1, 4, 7])
@@ -63,6 +71,15 @@ def test_limits_hold_with_wrong_masses_only_where_they_learn(seed):
     )
     assert trusting > 1e-3
     assert learning < 0.0
+
+
+@pytest.mark.parametrize("kind", [osc.Controller, ReferenceController])
+@pytest.mark.parametrize("seed", [1, 4, 7])
+def test_what_is_learnt_counts_where_a_limit_would_be_lost(kind, seed):
+    """The torque of a joint that is slowed by what the model does not know looks as if it went on."""
+    duration = 2.0 if kind is osc.Controller else 0.6
+    reach, _ = driven(0.01, kind=kind, duration=duration, mass_error=0.25, seed=seed)
+    assert not reach.lost
 
 
 def test_with_a_right_model_learning_changes_next_to_nothing():

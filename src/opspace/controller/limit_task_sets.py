@@ -65,8 +65,8 @@ def limit_terms(
         strict=True,
     ):
         haste = max(command - stopping, 0.0)
-        allowed = command - haste - side.sign * float(beside[side.index])
-        terms.append(LimitTerms(side, allowed, margin, haste, last))
+        more = side.sign * float(beside[side.index])
+        terms.append(LimitTerms(side, command - haste - more, margin, haste, last - more))
     return terms
 
 

@@ -67,6 +67,7 @@ def begin_limits(work):
         if option[LIMIT_BOUND] != 0.0:
             stop(work, limit, j)
         limit[COMMAND] -= limit[DISTURBANCE]
+        limit[LAST] -= limit[DISTURBANCE]
 
 
 @jit

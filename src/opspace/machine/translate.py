@@ -53,11 +53,11 @@ class Translation(CodeLibrary):
 
     def get_function(self, name: str) -> Any:
         """Refuse: there is no code."""
-        raise NotImplementedError(name)
+        raise RuntimeError(f"{name} is translated only: there is no code of it to call")
 
     def get_asm_str(self) -> None:
         """Refuse: there is no code."""
-        raise NotImplementedError
+        raise RuntimeError(f"{self.name} is translated only: there is no code of it to show")
 
 
 def translate_only() -> None:

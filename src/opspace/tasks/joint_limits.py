@@ -60,7 +60,8 @@ class JointLimits(KnownAttributes):
         q̈_adm = min(−v v_adm'(d) + k₂ (v_adm(d) − v), k₂ (v_max − v))
 
     is the largest acceleration towards the limit from which the joint still stops at it, and with
-    which it does not become faster than v_max.
+    which it does not become faster than v_max. A joint that comes faster than v_adm brakes more, as
+    much as its motors give, see `opspace.law.scalars.stopping_command`.
 
     In mode ``admissible`` it is a bound: the controller answers the acceleration nearest to what the
     stack wants among those that no joint's q̈_adm forbids, see `opspace.law.nearest`. The whole
