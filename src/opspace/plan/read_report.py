@@ -120,7 +120,8 @@ class CompiledReport:
         B = np.array(kept[first : first + rows, : int(width)])
         sizes = {"fewer": min(B.shape), "more": max(B.shape)}
         found = SPECTRUM.make(sizes, {"B": B, "option": plan.tick.option})
-        KERNELS["spectrum"](found.handle().address)
+        handle = found.handle()  # has to last as long as the call, which is given its address only
+        KERNELS["spectrum"](handle.address)
         names = tuple(p.task.name for p in packed)
         return LevelStatus(
             level, names, found.sigma, found.activation, found.response, found.directions, scale
