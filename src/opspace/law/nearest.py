@@ -124,6 +124,35 @@ def _hold(
     return False
 
 
+def nearest_within(
+    x: Float[np.ndarray, " n"],
+    rows: Float[np.ndarray, "k n"],
+    bounds: Float[np.ndarray, " k"],
+    softness: Float[np.ndarray, " k"],
+) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, " k"]]:
+    """Find the point nearest to x with rows · y <= bounds, whatever the length of the rows.
+
+    What softness leaves of the excess where much is asked for is projected away again.
+
+    Args:
+        x: (n,).
+        rows: (k, n), none of them zero where its bound is finite.
+        bounds: (k,), those from `UNBOUNDED` on are none.
+        softness: (k,) above 0, of rows of unit length.
+
+    Returns:
+        The point, (n,), and by how much each bound moved it along its row, (k,).
+    """
+    there = bounds < UNBOUNDED
+    taken = np.zeros(bounds.size)
+    size = np.linalg.norm(rows, axis=1)
+    unit = rows[there] / size[there, None]
+    for _ in range(CLEANINGS):
+        x, multipliers = nearest_point(x, unit, bounds[there] / size[there], softness[there])
+        taken[there] += multipliers * size[there]
+    return x, taken
+
+
 def nearest_acceleration(
     L: Float[np.ndarray, "n n"],
     W: Float[np.ndarray, "n n"],
@@ -160,16 +189,10 @@ def nearest_acceleration(
     rows = np.concatenate([joints, -joints, motors, -motors])
     bounds = np.concatenate([upper, -lower, torque_upper, -torque_lower])
     softness = np.repeat([SOFT, HARD], 2 * n)
-    there = bounds < UNBOUNDED
-    taken = np.zeros(4 * n)
-    if not np.any(there):
+    if not np.any(bounds < UNBOUNDED):
+        taken = np.zeros(4 * n)
         return Nearest(acceleration, taken[:n], taken[:n], motors=False)
-    size = np.linalg.norm(rows, axis=1)
-    unit = rows[there] / size[there, None]
-    z = C.T @ acceleration
-    for _ in range(CLEANINGS):
-        z, multipliers = nearest_point(z, unit, bounds[there] / size[there], softness[there])
-        taken[there] += multipliers * size[there]
+    z, taken = nearest_within(C.T @ acceleration, rows, bounds, softness)
     return Nearest(
         np.linalg.solve(C.T, z), taken[:n], taken[n : 2 * n], motors=bool(np.any(taken[2 * n :]))
     )
