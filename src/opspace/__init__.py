@@ -9,9 +9,13 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from opspace.command import Command as Command
+    from opspace.command import ContactStatus as ContactStatus
     from opspace.command import LevelStatus as LevelStatus
     from opspace.command import Status as Status
     from opspace.command import TaskStatus as TaskStatus
+    from opspace.contacts import Contact as Contact
+    from opspace.contacts import PointContact as PointContact
+    from opspace.contacts import SoleContact as SoleContact
     from opspace.controller import Controller as Controller
     from opspace.errors import InputError as InputError
     from opspace.errors import MissingExtraError as MissingExtraError
@@ -84,7 +88,8 @@ if TYPE_CHECKING:
     from opspace.view import Viewer as Viewer
 
 _NAMES = {
-    "opspace.command": "Command LevelStatus Status TaskStatus",
+    "opspace.command": "Command ContactStatus LevelStatus Status TaskStatus",
+    "opspace.contacts": "Contact PointContact SoleContact",
     "opspace.controller": "Controller",
     "opspace.errors": (
         "InputError MissingExtraError ModelError ModelWarning OpspaceError RecordingError ScenarioError "

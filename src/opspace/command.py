@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Flag, IntFlag
+from types import MappingProxyType
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -36,6 +37,13 @@ class Status(IntFlag):
     joint came too fast to be stopped at its limit."""
     HANDOVER = 1024
     """The torque is on its way from or to another controller's."""
+    GIVEN_UP = 2048
+    """Contacts, motors or joints do not allow what the tasks want, and more than a thousandth of the
+    weight was given up."""
+    CONTACT_WAITS = 4096
+    """A contact that is to go stays, because the others cannot carry what it does."""
+    NOT_BALANCED = 8192
+    """What was given up is more than 0.3 weights: the robot will fall if this lasts."""
     FAULT = 8
     """No finite torque was found; the command is bias compensation with damping."""
 
@@ -87,6 +95,31 @@ class LevelStatus:
     scale: float = 1.0
 
 
+@dataclass(frozen=True, slots=True)
+class ContactStatus:
+    """One contact in one tick.
+
+    Attributes:
+        progress: How far it has come, 0 out to 1 in.
+        motion: h_m, activation of its motion.
+        activation: h_f, activation of its force.
+        force: (3,) force on the robot that the command plans, in world axes, N.
+        moment: (3,) moment about the contact's point, in world axes, N·m; zero for a point.
+        cop: (2,) centre of pressure in the contact's axes, m; zero where nothing presses.
+        cone_use: Part of its cone that the force uses, 1 at the edge.
+        waiting: Whether it is to go and stays because the others cannot carry.
+    """
+
+    progress: float
+    motion: float
+    activation: float
+    force: np.ndarray
+    moment: np.ndarray
+    cop: np.ndarray
+    cone_use: float
+    waiting: bool
+
+
 class Report(Protocol):
     """What a tick tells about tasks, levels and limits, perhaps worked out only when asked."""
 
@@ -105,6 +138,14 @@ class Report(Protocol):
         """Activation of the joint-limit tasks that are not at 0, by "joint/side"."""
         ...
 
+    @property
+    def contacts(self) -> Mapping[str, ContactStatus]:
+        """Status of each contact by name."""
+        ...
+
+
+NO_CONTACTS: Mapping[str, ContactStatus] = MappingProxyType({})
+
 
 @dataclass(frozen=True, slots=True)
 class Found:
@@ -113,6 +154,7 @@ class Found:
     tasks: Mapping[str, TaskStatus]
     levels: tuple[LevelStatus, ...]
     limits: Mapping[str, float]
+    contacts: Mapping[str, ContactStatus] = field(default_factory=lambda: NO_CONTACTS)
 
 
 class Command(NamedTuple):
@@ -151,3 +193,8 @@ class Command(NamedTuple):
     def limits(self) -> Mapping[str, float]:
         """Activation of the joint-limit tasks that are not at 0, by "joint/side"."""
         return self.report.limits
+
+    @property
+    def contacts(self) -> Mapping[str, ContactStatus]:
+        """Status of each contact by name."""
+        return self.report.contacts

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from types import MappingProxyType
+from typing import NamedTuple
 
 import numpy as np
 
-from opspace.command import Status
+from opspace.command import NO_CONTACTS, ContactStatus, Status
 from opspace.controller.limit_task_sets import LimitTerms
-from opspace.law import BROKEN, LOST, Nearest, excess, nearest_acceleration
+from opspace.law import BROKEN, LOST, excess, nearest_acceleration
 from opspace.robots.protocol import Robot
 
 
@@ -78,9 +80,26 @@ class Bounds:
         return bool(above) or excess(acceleration, self.lower, self.upper) > BROKEN
 
 
-def realise(
-    bounds: Bounds, tau: np.ndarray, metric: Callable[[], np.ndarray]
-) -> tuple[np.ndarray, Status, dict[str, float]]:
+class Kept(NamedTuple):
+    """A torque that keeps what it can.
+
+    Attributes:
+        tau: (n,) N·m.
+        status: What happened.
+        limits: By name how much each joint limit acts: the acceleration that it takes from its joint,
+            as a part of its margin, at most 1.
+        contacts: What each contact carries.
+        hindrance: What contacts could not carry, as a multiple of what a contact that leaves may cost.
+    """
+
+    tau: np.ndarray
+    status: Status = Status.OK
+    limits: Mapping[str, float] = MappingProxyType({})
+    contacts: Mapping[str, ContactStatus] = NO_CONTACTS
+    hindrance: float = 0.0
+
+
+def realise(bounds: Bounds, tau: np.ndarray, metric: Callable[[], np.ndarray]) -> Kept:
     """Replace a torque by the nearest one with which no joint and no motor does more than it may.
 
     Args:
@@ -89,13 +108,12 @@ def realise(
         metric: Gives W, in which "near" is measured; asked only where something is outside.
 
     Returns:
-        The torque, what happened, and by name how much each limit acts: the acceleration that it
-        takes from its joint, as a part of its margin, at most 1.
+        The torque and what happened.
     """
     M, bias = bounds.M, bounds.bias
     acceleration = np.linalg.solve(M, tau - bias)
     if not bounds.broken(tau, acceleration):
-        return tau, Status.LIMIT_LOST if bounds.lost(acceleration) else Status.OK, {}
+        return Kept(tau, Status.LIMIT_LOST if bounds.lost(acceleration) else Status.OK)
     found = nearest_acceleration(
         np.linalg.cholesky(M),
         metric(),
@@ -111,7 +129,7 @@ def realise(
         status |= Status.TORQUE_SCALED
     if bounds.lost(found.acceleration):
         status |= Status.LIMIT_LOST
-    return tau, status, _acting(bounds.terms, found)
+    return Kept(tau, status, acting(bounds.terms, found.upper, found.lower))
 
 
 def change_within_tick(
@@ -135,10 +153,18 @@ def change_within_tick(
     return later - acceleration
 
 
-def _acting(terms: Sequence[LimitTerms], found: Nearest) -> dict[str, float]:
-    taken = [
-        (found.upper if term.side.sign > 0.0 else found.lower)[term.side.index] for term in terms
-    ]
+def acting(terms: Sequence[LimitTerms], upper: np.ndarray, lower: np.ndarray) -> dict[str, float]:
+    """Tell by name how much each limit acts.
+
+    Args:
+        terms: Joint limits that are bounds.
+        upper: (n,) by how much each upper bound lowers its joint's acceleration, rad/s².
+        lower: (n,) the same of each lower bound.
+
+    Returns:
+        The acceleration that a limit takes from its joint, as a part of its margin, at most 1.
+    """
+    taken = [(upper if term.side.sign > 0.0 else lower)[term.side.index] for term in terms]
     return {
         term.side.name: min(float(part) / term.margin, 1.0)
         for term, part in zip(terms, taken, strict=True)

@@ -9,8 +9,15 @@ from typing import NamedTuple
 import numpy as np
 
 from opspace.command import Found, Status
-from opspace.controller.bounds import Bounds, change_within_tick, realise
+from opspace.controller.bounds import Bounds, Kept, change_within_tick, realise
+from opspace.controller.contact_stages import (
+    Touch,
+    contact_task_sets,
+    evaluate_contacts,
+    stand,
+)
 from opspace.controller.disturbance import DisturbanceObserver
+from opspace.controller.drivable import joint_positions
 from opspace.controller.limit_task_sets import (
     LimitTerms,
     braking,
@@ -35,7 +42,7 @@ from opspace.law.blending import combined
 from opspace.law.scalars import SCALED
 from opspace.plan.scales import Scales
 from opspace.robots.protocol import Robot
-from opspace.stack import Blending, Member, Mixture, mixture, presences
+from opspace.stack import Blending, ContactMember, Member, Mixture, mixture, presences
 from opspace.tasks import JointLimits, PostureTask, TaskTerms, TrackingTask
 from opspace.tasks.activations import own_activation
 
@@ -119,6 +126,8 @@ class Given:
         M: (n, n) inertia.
         bias: (n,) Coriolis, centrifugal and gravity torque, N·m.
         torque_limit: (n,) what the motors give, N·m.
+        base: Number of the first coordinates without a motor, those of a floating base.
+        contacts: What a robot with such a base touches.
     """
 
     rules: Rules
@@ -130,6 +139,8 @@ class Given:
     M: np.ndarray
     bias: np.ndarray
     torque_limit: np.ndarray
+    base: int = 0
+    contacts: Sequence[ContactMember] = ()
 
 
 class Blend(NamedTuple):
@@ -140,12 +151,16 @@ class Blend(NamedTuple):
 
 
 class Answer(NamedTuple):
-    """Torque (n,), N·m, what happened, the number of hard torques and what there is to report."""
+    """Torque (n,), N·m, what happened, the number of hard torques and what there is to report.
+
+    ``hindrance`` is what the contacts could not carry, see `opspace.stack.ContactMember.advance`.
+    """
 
     tau: np.ndarray
     status: Status
     hard_solves: int
     found: Found
+    hindrance: float = 0.0
 
 
 def tick(k: Given) -> Answer | None:
@@ -163,16 +178,22 @@ def tick(k: Given) -> Answer | None:
     tasks = whiten_tasks(k, h, terms, mixed, L)
     limits = begin_limits(k)
     inserted = insert_limits(k)
+    touches = evaluate_contacts(k)
+    above = on_the_ground(k, touches, limit_corners(k, limits, inserted))
     try:
-        gamma, info = law(k, L, mixed, tasks, limit_corners(k, limits, inserted))
-        tau, kept, acting = keep_bounds(k, L, limits, tasks, torque(k, gamma))
+        gamma, info = law(k, L, mixed, tasks, above)
+        if k.base:
+            kept = stand(k, L, limits, touches, metric(L, tasks), gamma)
+        else:
+            kept = keep_bounds(k, L, limits, tasks, torque(k, gamma))
     except (InputError, np.linalg.LinAlgError):
         # Everything that went in is finite: these numbers are too large to compute with.
         return None
-    active = {limits[i].side.name: limit for i, limit in inserted.items()} | acting
-    levels = level_status(k.members, mixed, info, len(inserted))
-    found = Found(task_status(k.members, h, terms, mixed), levels, active)
-    return Answer(tau, status(k, tau, info, found) | kept, info.hard_solves, found)
+    active = {limits[i].side.name: limit for i, limit in inserted.items()} | dict(kept.limits)
+    levels = level_status(k.members, mixed, info, len(above.task_sets))
+    found = Found(task_status(k.members, h, terms, mixed), levels, active, kept.contacts)
+    happened = status(k, kept.tau, info, found) | kept.status
+    return Answer(kept.tau, happened, info.hard_solves, found, kept.hindrance)
 
 
 def activations(k: Given) -> list[float]:
@@ -259,7 +280,9 @@ def law(
     first = len(limits.task_sets)
     shifted = [Weighted(w, frozenset(first + i for i in here)) for w, here in tasks.corners]
     everything = combined(limits.corners, shifted)
-    motors = Motors(L, start_inside(k), k.torque_limit) if rules.keep_torque else None
+    # On the ground the motors' limits act behind the law, together with those of the forces.
+    scales = rules.keep_torque and not k.base
+    motors = Motors(L, start_inside(k), k.torque_limit) if scales else None
     buffer, motion = rules.scales.buffer, L.T @ k.v
     return rules.law(Question(L, sets, everything, mixed.levels, buffer, motors, motion))
 
@@ -278,13 +301,14 @@ def begin_limits(k: Given) -> list[LimitTerms]:
     if observer is not None:
         observer.observe(k.t, k.v)
     most = braking(k.M, k.bias, k.torque_limit)
-    return limit_terms(limits, k.q, k.v, most, k.rules.period, observer and observer.acceleration)
+    at = joint_positions(k.robot)
+    return limit_terms(limits, at, k.v, most, k.rules.period, observer and observer.acceleration)
 
 
 def insert_limits(k: Given) -> dict[int, float]:
     """Activation of the limits that take part as task sets, by index (Fig. 7)."""
     limits = k.rules.limits
-    found = [] if limits is None else limits.presences(k.q, k.v)
+    found = [] if limits is None else limits.presences(joint_positions(k.robot), k.v)
     return {i: h for i, h in enumerate(found) if h > 0.0}
 
 
@@ -297,6 +321,17 @@ def limit_corners(k: Given, limits: Sequence[LimitTerms], inserted: Mapping[int,
     return Blend(sets, corners([task.activation for task in sets], "chain"))
 
 
+def on_the_ground(k: Given, touches: Sequence[Touch], limits: Blend) -> Blend:
+    """Put what contacts hold above the joint limits."""
+    sets = contact_task_sets(touches)
+    if not sets:
+        return limits
+    first = len(sets)
+    shifted = [Weighted(w, frozenset(first + i for i in here)) for w, here in limits.corners]
+    closing = corners([touch.motion for touch in touches if touch.motion > 0.0], "chain")
+    return Blend([*sets, *limits.task_sets], combined(closing, shifted))
+
+
 def torque(k: Given, gamma: np.ndarray) -> np.ndarray:
     """Γ = Γ_tasks + b + g (Eq. 4), the bias as far as the motors give it."""
     if k.rules.keep_torque:
@@ -306,22 +341,22 @@ def torque(k: Given, gamma: np.ndarray) -> np.ndarray:
 
 def keep_bounds(
     k: Given, L: np.ndarray, limits: Sequence[LimitTerms], tasks: Blend, tau: np.ndarray
-) -> tuple[np.ndarray, Status, dict[str, float]]:
+) -> Kept:
     """Take the nearest torque with which no joint and no motor does more than it may."""
     rules, observer = k.rules, k.rules.observer
-    kept, acting = Status.OK, {}
+    kept = Kept(tau)
     keeps = limits if rules.limits is not None and rules.limits.law.bound else []
     if keeps or rules.keep_torque:
         room = k.torque_limit if rules.keep_torque else np.full(k.v.size, np.inf)
-        bounds, wanted = Bounds(keeps, k.M, k.bias, room), tau
-        tau, kept, acting = realise(bounds, wanted, lambda: metric(L, tasks))
-        acceleration = np.linalg.solve(k.M, tau - k.bias)
+        bounds = Bounds(keeps, k.M, k.bias, room)
+        kept = realise(bounds, tau, lambda: metric(L, tasks))
+        acceleration = np.linalg.solve(k.M, kept.tau - k.bias)
         if rules.period > 0.0 and k.q.size == k.v.size and bounds.near(acceleration):
-            change = change_within_tick(k.robot, tau, acceleration, rules.period)
-            tau, kept, acting = realise(bounds.after(change), wanted, lambda: metric(L, tasks))
+            change = change_within_tick(k.robot, kept.tau, acceleration, rules.period)
+            kept = realise(bounds.after(change), tau, lambda: metric(L, tasks))
     if observer is not None:
-        observer.remember(k.t, k.v, np.linalg.solve(k.M, tau - k.bias))
-    return tau, kept, acting
+        observer.remember(k.t, k.v, np.linalg.solve(k.M, kept.tau - k.bias))
+    return kept
 
 
 def metric(L: np.ndarray, tasks: Blend) -> np.ndarray:

@@ -10,6 +10,7 @@ import numpy as np
 from opspace.errors import InputError, ModelError, missing_extra
 from opspace.robots.adapter import spread_of
 from opspace.sim.disturbances import NO_DISTURBANCES, Disturbances, Hand, Wire
+from opspace.sim.ground import Ground
 
 if TYPE_CHECKING:
     from opspace.robots.protocol import Robot
@@ -36,6 +37,8 @@ class Plant:
         adds_gravity: Add the torque that holds the weight to every command, as robots do whose
             drivers are told the rest only; see ``gravity`` of `opspace.Controller`.
         disturbances: What the controller's model does not know.
+        ground: What a robot with a floating base stands on; None is nothing.
+        substeps: Steps of the simulation in one time step.
 
     Raises:
         MissingExtraError: MuJoCo is not installed.
@@ -54,6 +57,8 @@ class Plant:
         torque_limits: bool = True,
         adds_gravity: bool = False,
         disturbances: Disturbances = NO_DISTURBANCES,
+        ground: Ground | None = None,
+        substeps: int = 1,
     ) -> None:
         if not (math.isfinite(dt) and dt > 0.0):
             raise InputError(f"the time step must be above 0 s, got {dt}")
@@ -63,14 +68,18 @@ class Plant:
         if robot.source is None:
             raise ModelError(f"robot {robot.name!r} has no file that a simulator could load")
         self._mujoco = mujoco
-        self.model = model_of(robot)
-        self.model.opt.timestep = dt
+        if substeps < 1:
+            raise InputError(f"a time step has at least one substep, got {substeps}")
+        self.model = model_of(robot, None if ground is None else ground.add_to)
+        self.model.opt.timestep = dt / substeps
+        self._ground, self._substeps = ground, substeps
         # Implicit in the velocity: stable for stiff friction, exact for a frictionless arm to O(dt).
         self.model.opt.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
         # Joint ranges are the controller's job, and a stop or a contact would hide its failures.
+        if ground is None:
+            self.model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT
         self.model.opt.disableflags |= (
-            mujoco.mjtDisableBit.mjDSBL_CONTACT
-            | mujoco.mjtDisableBit.mjDSBL_LIMIT
+            mujoco.mjtDisableBit.mjDSBL_LIMIT
             | mujoco.mjtDisableBit.mjDSBL_ACTUATION
             # A run that diverges must be seen to diverge, not start again from the beginning.
             | mujoco.mjtDisableBit.mjDSBL_AUTORESET
@@ -165,7 +174,13 @@ class Plant:
             self.data.qfrc_applied[:] = given
         else:
             self.data.qfrc_applied[self._spread.leaders] = given
-        self._mujoco.mj_step(self.model, self.data)
+        for _ in range(self._substeps):
+            self._mujoco.mj_step(self.model, self.data)
+
+    @property
+    def contact_forces(self) -> dict[str, np.ndarray]:
+        """What presses on each contact of the ground, (3,) N on the robot in world axes, by name."""
+        return {} if self._ground is None else self._ground.forces(self.model, self.data)
 
     def _own(self, values: np.ndarray) -> np.ndarray:
         """Leave the joints that lead; those that follow belong to the simulation."""
