@@ -55,7 +55,9 @@ if TYPE_CHECKING:
     from opspace.robots import RobotInfo as RobotInfo
     from opspace.robots import available_robots as available_robots
     from opspace.robots import load_robot as load_robot
+    from opspace.sim import Ground as Ground
     from opspace.sim import Plant as Plant
+    from opspace.sim import Wall as Wall
     from opspace.stack import Stack as Stack
     from opspace.tasks import ActivationProduct as ActivationProduct
     from opspace.tasks import Chain as Chain
@@ -106,7 +108,7 @@ _NAMES = {
     "opspace.loop": "AnyPlant Observer Outcome Stepping StopRule simulate",
     "opspace.plan.calibration": "Calibration",
     "opspace.plan.scales": "Singularity",
-    "opspace.sim": "Plant",
+    "opspace.sim": "Ground Plant Wall",
     "opspace.stack": "Stack",
     "opspace.tasks": (
         "ActivationProduct Chain Circle ComTask Constant DistanceBuffer JerkLimited JointBuffer "

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Flag, IntFlag
-from types import MappingProxyType
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -144,7 +143,7 @@ class Report(Protocol):
         ...
 
 
-NO_CONTACTS: Mapping[str, ContactStatus] = MappingProxyType({})
+NO_CONTACTS: Mapping[str, ContactStatus] = {}
 
 
 @dataclass(frozen=True, slots=True)
@@ -154,7 +153,7 @@ class Found:
     tasks: Mapping[str, TaskStatus]
     levels: tuple[LevelStatus, ...]
     limits: Mapping[str, float]
-    contacts: Mapping[str, ContactStatus] = field(default_factory=lambda: NO_CONTACTS)
+    contacts: Mapping[str, ContactStatus] = field(default_factory=dict[str, ContactStatus])
 
 
 class Command(NamedTuple):

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from opspace.errors import InputError, unknown_name
-from opspace.law.contact import NORMAL, ForceSet
+from opspace.law.contact_forces import NORMAL, ForceSet
 from opspace.tasks.known_attributes import KnownAttributes
 from opspace.tasks.rotation import cross, skew
 from opspace.tasks.validation import Array, finite_array

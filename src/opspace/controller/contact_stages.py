@@ -12,7 +12,7 @@ from opspace.contacts import ContactTerms, SoleContact
 from opspace.controller.bounds import Bounds, Kept, acting
 from opspace.controller.limit_task_sets import TOP, LimitTerms
 from opspace.law import TaskSet, corners
-from opspace.law.contact import (
+from opspace.law.contact_forces import (
     NORMAL,
     ForceSet,
     Realised,

@@ -13,7 +13,7 @@ import mujoco
 import numpy as np
 
 from opspace.errors import ModelError
-from opspace.robots.adapter import held_joints
+from opspace.robots.adapter import added_armature, held_joints
 from opspace.robots.description import BASE_JOINT, WORLD, Description, ModelOrigin, mid_range
 from opspace.robots.joint_roles import (
     ALL_WITH_A_MOTOR,
@@ -72,6 +72,7 @@ def mujoco_model(
     floating_base: bool = False,
     locked_joints: Collection[str] | Mapping[str, float | None] = (),
     extend: Callable[[mujoco.MjSpec], None] | None = None,
+    armature: float = 0.0,
 ) -> mujoco.MjModel:
     """Compile a robot file into a plant that can be simulated and rendered.
 
@@ -87,6 +88,7 @@ def mujoco_model(
         locked_joints: Joints to hold fixed, and where, rad or m; names alone are held where the
             file has them.
         extend: Adds what else there is to the specification, such as shapes that touch.
+        armature: Inertia of the motor at every joint of a URDF, kg·m² or kg.
 
     Returns:
         The compiled model.
@@ -97,7 +99,7 @@ def mujoco_model(
     path = Path(source)
     origin = ModelOrigin.of(path)
     if path.suffix == ".urdf":
-        urdf = read_urdf(path, locked_joints, floating_base)
+        urdf = read_urdf(path, locked_joints, floating_base, armature=armature)
         spec = urdf_spec(urdf, floating_base)
         add_skeleton(spec)
         couple(spec, urdf.roles.couplings, {})
@@ -123,7 +125,9 @@ def model_of(robot: Robot, extend: Callable[[mujoco.MjSpec], None] | None = None
     """
     if robot.source is None:
         raise ModelError(f"robot {robot.name!r} has no file that MuJoCo could load")
-    return mujoco_model(robot.source, robot.floating_base, held_joints(robot), extend)
+    return mujoco_model(
+        robot.source, robot.floating_base, held_joints(robot), extend, added_armature(robot)
+    )
 
 
 def _zero(model: mujoco.MjModel) -> dict[str, float]:

@@ -9,7 +9,7 @@ from scipy.optimize import nnls
 
 from opspace.law import TaskSet, corners, task_torque
 from opspace.law.cones import point_cone, point_metric, sole_cone, sole_metric
-from opspace.law.contact import ForceSet, Room, Wish, free_motions, realise, share
+from opspace.law.contact_forces import ForceSet, Room, Wish, free_motions, realise, share
 
 BASE = 6
 HALF, MU = (0.1, 0.05), 0.5
