@@ -9,7 +9,7 @@ from scipy.optimize import nnls
 
 from opspace.law import TaskSet, corners, task_torque
 from opspace.law.cones import point_cone, point_metric, sole_cone, sole_metric
-from opspace.law.contact_forces import ForceSet, Room, Wish, free_motions, realise, share
+from opspace.law.contact_forces import NEARNESS, ForceSet, Room, Wish, free_motions, realise, share
 
 BASE = 6
 HALF, MU = (0.1, 0.05), 0.5
@@ -205,7 +205,7 @@ def oracle(wish, sets, room):
         s.activation * np.trace(s.J[:, :BASE] @ np.linalg.solve(A, s.J[:, :BASE].T)) for s in sets
     )
     R = np.concatenate([s.metric for s in sets])
-    e = 1e-2 * trace / sum(s.activation * s.metric.sum() for s in sets)
+    e = NEARNESS * trace / sum(s.activation * s.metric.sum() for s in sets)
     # x = (y, d): q̈ = q̈* + L⁻ᵀ Z y, λ = λ* + d
     r, m = held.shape[1], lam.size
     H = np.zeros((r + m, r + m))

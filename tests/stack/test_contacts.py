@@ -152,6 +152,8 @@ def test_names_levels_and_what_is_no_contact_are_refused():
         osc.Stack([], contacts=[osc.PostureTask()])
     with pytest.raises(UnknownNameError, match="hand"):
         stack.remove(sole("hand"))
+    with pytest.raises(InputError, match="at most 16 contacts"):
+        stack_of(*(sole(f"foot{i}") for i in range(17)))
     for bad in ({"friction": 0.0}, {"max_force": -1.0}, {"offset": (0.0, np.nan, 0.0)}):
         with pytest.raises(InputError, match="contact 'foot'"):
             osc.SoleContact("foot", (0.1, 0.05), **bad)

@@ -39,7 +39,7 @@ HARDEST = 1e4
 """Where h/(1 − h) ends, with which that grows."""
 LEVER = 0.1
 """Moment that counts like a force, over that force, m."""
-MAY_GIVE_UP = 0.02
+MAY_GIVE_UP = 0.01
 """Part of the weight that a removal may cost before the contact waits."""
 BARELY = 1e-6
 """Part of the largest force below which nothing presses."""
@@ -110,40 +110,33 @@ def stand(
     Returns:
         Torque, motion and forces.
     """
-    base, rules = k.base, k.rules
-    wanted = np.linalg.solve(k.M, gamma)
+    rules, base = k.rules, k.base
     sets = [touch.member.contact.force_set(touch.terms, touch.force) for touch in touches]
-    there = [i for i, touch in enumerate(touches) if touch.force > 0.0]
-    carrying = [sets[i] for i in there]
-    blend = corners([one.activation for one in carrying], "chain" if len(there) > 4 else "idv")
-    wrench = (gamma + k.bias)[:base]
-    held = [t.terms.J for t in touches if t.motion == 1.0]
-    free = free_motions(np.concatenate([np.zeros((0, k.v.size)), *held]), L)
-    metric = W + _entering(touches, L)
-    wish = Wish(L, k.bias, wanted, share(carrying, wrench, blend), metric, free, base)
+    carrying = [one for one in sets if one.activation > 0.0]
+    blend = corners([one.activation for one in carrying], "idv")
+    wanted = share(carrying, (gamma + k.bias)[:base], blend)
+    held = [np.zeros((0, k.v.size)), *(t.terms.J for t in touches if t.motion == 1.0)]
+    free = free_motions(np.concatenate(held), L)
+    wish = Wish(
+        L, k.bias, np.linalg.solve(k.M, gamma), wanted, W + entering(touches, L), free, base
+    )
     keeps = limits if rules.limits is not None and rules.limits.law.bound else []
     room = k.torque_limit if rules.keep_torque else np.full(k.v.size, np.inf)
     bounds = Bounds(keeps, k.M, k.bias, room)
     found = realise(wish, carrying, Room(bounds.lower, bounds.upper, room))
+    if rules.observer is not None:
+        rules.observer.remember(k.t, k.v, found.acceleration)
     weight = float(np.linalg.norm(k.robot.gravity[:3]))
     lost = _size(found.given_up) / max(weight, np.finfo(float).tiny)
-    forces = {touches[i].member.contact.name: f for i, f in zip(there, found.forces, strict=True)}
     status = _status(found, lost, touches)
     if bounds.lost(found.acceleration):
         status |= Status.LIMIT_LOST
-    told = {
-        touch.member.contact.name: contact_status(
-            touch, one, forces.get(touch.member.contact.name, np.zeros(one.metric.size))
-        )
-        for touch, one in zip(touches, sets, strict=True)
-    }
     names = acting(bounds.terms, found.upper, found.lower)
-    if rules.observer is not None:
-        rules.observer.remember(k.t, k.v, found.acceleration)
+    told = _told(touches, sets, found.forces)
     return Kept(found.tau, status, names, told, lost / MAY_GIVE_UP)
 
 
-def _entering(touches: Sequence[Touch], L: np.ndarray) -> np.ndarray:
+def entering(touches: Sequence[Touch], L: np.ndarray) -> np.ndarray:
     """Hold contacts on their way in the metric, the harder the nearer they are to closed."""
     W = np.zeros(L.shape)
     for touch in touches:
@@ -172,6 +165,19 @@ def _status(found: Realised, lost: float, touches: Sequence[Touch]) -> Status:
     if any(touch.member.waiting for touch in touches):
         status |= Status.CONTACT_WAITS
     return status
+
+
+def _told(
+    touches: Sequence[Touch], sets: Sequence[ForceSet], forces: Sequence[np.ndarray]
+) -> dict[str, ContactStatus]:
+    """Tell about every contact, those that carry nothing included."""
+    left = iter(forces)
+    return {
+        touch.member.contact.name: contact_status(
+            touch, one, next(left) if one.activation > 0.0 else np.zeros(one.metric.size)
+        )
+        for touch, one in zip(touches, sets, strict=True)
+    }
 
 
 def contact_status(touch: Touch, one: ForceSet, force: np.ndarray) -> ContactStatus:

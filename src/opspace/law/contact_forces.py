@@ -20,7 +20,7 @@ from opspace.law.scalars import BROKEN, HARD, RANK_TOLERANCE, SOFT
 
 NORMAL = 2
 """Component of a contact's force that points out of the surface."""
-NEARNESS = 1e-2
+NEARNESS = 3e-2
 """How much the nearness of the forces counts beside that of the motion: it keeps the answer from
 turning sharply where a limit comes to act, and costs nothing while none does."""
 REGULAR = 1e-9

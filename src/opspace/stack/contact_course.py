@@ -11,6 +11,7 @@ from typing import NamedTuple
 from opspace.contacts import Contact
 from opspace.errors import InputError, unknown_name
 from opspace.law import PROFILES
+from opspace.law.blending import MOST_MOVING
 from opspace.law.scalars import profile
 from opspace.stack.changes import Timing
 
@@ -130,7 +131,12 @@ class ContactCourse:
             return not due and all(m.progress == m.target for m in self._members.values())
 
     def start_with(self, contact: Contact) -> None:
-        """Add a contact that is in from the start."""
+        """Add a contact that is in from the start.
+
+        Raises:
+            InputError: There are too many.
+        """
+        self._check_room()
         self._members[contact.name] = ContactMember(contact, 1.0, 1.0)
         self._present = tuple(self._members.values())
 
@@ -144,7 +150,7 @@ class ContactCourse:
         """Let a contact come, or come back.
 
         Raises:
-            InputError: Another contact has its name.
+            InputError: Another contact has its name, or there are too many.
         """
         known = {one.name: one for one in self}
         if known.get(contact.name, contact) is not contact:
@@ -152,9 +158,15 @@ class ContactCourse:
                 f"another contact named {contact.name!r} is in the stack; give this one a name of "
                 "its own (name=...)"
             )
-        if contact.name not in known and self._bind is not None:
-            self._bind(contact)
+        if contact.name not in known:
+            self._check_room()
+            if self._bind is not None:
+                self._bind(contact)
         self._ask(contact, 1.0, timing, waits=True)
+
+    def _check_room(self) -> None:
+        if len(list(self)) >= MOST_MOVING:
+            raise InputError(f"a stack takes at most {MOST_MOVING} contacts")
 
     def remove(self, subject: Contact | str, timing: Timing, *, wait: bool) -> None:
         """Let a contact go.
