@@ -60,6 +60,7 @@ if TYPE_CHECKING:
     from opspace.sim import Wall as Wall
     from opspace.stack import Stack as Stack
     from opspace.tasks import ActivationProduct as ActivationProduct
+    from opspace.tasks import AngularMomentumTask as AngularMomentumTask
     from opspace.tasks import Chain as Chain
     from opspace.tasks import Circle as Circle
     from opspace.tasks import ComTask as ComTask
@@ -111,7 +112,8 @@ _NAMES = {
     "opspace.sim": "Ground Plant Wall",
     "opspace.stack": "Stack",
     "opspace.tasks": (
-        "ActivationProduct Chain Circle ComTask Constant DistanceBuffer JerkLimited JointBuffer "
+        "ActivationProduct AngularMomentumTask Chain Circle ComTask Constant DistanceBuffer "
+        "JerkLimited JointBuffer "
         "JointLimits JointTask MinimumJerk OrientationJerkLimited OrientationMinimumJerk "
         "OrientationTask PoseReference PoseTask PositionTask PostureTask Reference "
         "RelativeOrientationTask RelativePoseTask RelativePositionTask Sample Task TaskTerms "

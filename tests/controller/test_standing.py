@@ -169,6 +169,22 @@ def test_a_wanted_force_is_given_by_a_hand_and_taken_by_the_feet(g1):
     assert np.all(command.contacts["hand"].moment == 0.0)
 
 
+def test_a_quadruped_stands_on_points_and_its_momentum_decays_as_asked():
+    robot = osc.load_robot("solo12")
+    feet = [osc.PointContact(f, friction=0.8) for f in ("FL_FOOT", "FR_FOOT", "HL_FOOT", "HR_FOOT")]
+    tasks = [osc.AngularMomentumTask(kv=5.0), osc.ComTask(), osc.PostureTask()]
+    controller = osc.Controller(robot, osc.Stack(tasks, contacts=feet))
+    speed = 0.05 * np.random.default_rng(0).normal(size=robot.nv)
+    command = controller.step(0.0, robot.q_reference, speed)
+    assert command.status == osc.Status.OK
+    moved, felt = plant(robot, command.tau, feet)
+    for foot, force in zip(feet, felt, strict=True):
+        assert np.max(np.abs(command.contacts[foot.name].force - force)) < 1e-6
+    terms = controller.stack["angular_momentum"].evaluate(robot, 0.0)
+    assert np.max(np.abs(terms.J @ moved + terms.drift - terms.acceleration)) < 1e-8
+    assert np.max(np.abs(terms.acceleration)) > 1e-4
+
+
 def test_a_contact_has_an_activation_of_its_own(g1):
     controller = controller_of(g1)
     controller.stack.contacts["right"].activation = lambda _robot, t: 0.65 if t < 1.0 else 2.0

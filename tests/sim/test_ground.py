@@ -5,7 +5,7 @@ import pytest
 
 import opspace as osc
 from opspace.errors import InputError
-from opspace.sim import Ground, Wall
+from opspace.sim import Disturbances, Ground, Wall
 
 HALF, OFFSET = (0.085, 0.025), (0.035, 0.0, -0.035)
 WEIGHT = 33.34114202 * 9.81
@@ -53,6 +53,19 @@ def test_without_ground_nothing_touches():
     assert plant.contact_forces == {}
     robot.update(plant.q, plant.v)
     assert abs(robot.com_jacobian()[2] @ plant.v + 9.81 * 0.1) < 1e-3
+
+
+def test_no_command_pulls_at_the_base_and_friction_is_that_of_joints():
+    robot = osc.load_robot("g1")
+    disturbances = Disturbances(dry_friction=0.05)
+    for limits in (True, False):
+        plant = osc.Plant(robot, standing(robot), torque_limits=limits, disturbances=disturbances)
+        assert np.all(plant.model.dof_frictionloss[:6] == 0.0)
+        assert np.all(plant.model.dof_frictionloss[6:] > 0.0)
+        for _ in range(10):
+            plant.advance(1e3 * (np.arange(robot.nv) < 6))
+        robot.update(plant.q, plant.v)
+        assert abs(robot.com_jacobian()[2] @ plant.v + 9.81 * 0.01) < 1e-3
 
 
 def test_substeps_are_smaller_steps_in_the_same_time():

@@ -88,12 +88,13 @@ class Plant:
             self.model.dof_damping[:] = 0.0
             self.model.dof_frictionloss[:] = 0.0
         spread = self._spread = spread_of(robot)
-        limit = robot.torque_limit
+        # A floating base has no motor that a command could reach.
+        limit = motors = np.where(robot.actuated, robot.torque_limit, 0.0)
         if spread is not None:
             limit = np.zeros(self.model.nv)
-            limit[spread.leaders] = robot.torque_limit
+            limit[spread.leaders] = motors
         disturbances.spoil(self.model, limit)
-        self._limit = robot.torque_limit if torque_limits else np.full(robot.nv, np.inf)
+        self._limit = motors if torque_limits else np.where(robot.actuated, np.inf, 0.0)
         self._robot = robot
         self.adds_gravity = adds_gravity
         self._own_model = robot.fresh() if adds_gravity else None

@@ -5,6 +5,7 @@ from types import MappingProxyType
 from opspace.tasks.activations import ActivationProduct as ActivationProduct
 from opspace.tasks.activations import DistanceBuffer as DistanceBuffer
 from opspace.tasks.activations import JointBuffer as JointBuffer
+from opspace.tasks.angular_momentum import AngularMomentumTask as AngularMomentumTask
 from opspace.tasks.com import ComTask as ComTask
 from opspace.tasks.joint import JointTask as JointTask
 from opspace.tasks.joint_limits import JointLimits as JointLimits
