@@ -70,8 +70,8 @@ class Controller(ReferenceController):
     """Operational space control of a stack of tasks on a robot.
 
     Every tick is one call of compiled code, which computes what `ReferenceController` computes; the
-    arguments, errors and results are the same. The first controller on a machine compiles it, which
-    takes about half a minute; later ones read it from the disk.
+    arguments, errors and results are the same. A wheel brings it compiled; elsewhere the first
+    controller compiles it, which takes about half a minute, and later ones read it from the disk.
 
     Options are fixed when it is built. Robots with joints of several coordinates, and stacks of more
     than some thirty tasks, take the readable form.

@@ -1,4 +1,4 @@
-"""Compile kernels into one object with a C interface, optimised once as a whole."""
+"""Compile kernels into objects with a C interface, each optimised once as a whole."""
 
 # numba's own modules have no type stubs.
 # pyright: reportUnknownMemberType=false
@@ -30,7 +30,7 @@ LIBRARY = {
 NUMBERS = {float: types.float64, int: types.int64}
 
 
-def compile_object(entries: Sequence[KernelEntry], processor: Processor) -> bytes:
+def compile_objects(entries: Sequence[KernelEntry], processors: Sequence[Processor]) -> list[bytes]:
     """Compile entries and everything that they call.
 
     Numba only translates. LLVM optimises once, when all is in one piece: done function by function,
@@ -39,16 +39,22 @@ def compile_object(entries: Sequence[KernelEntry], processor: Processor) -> byte
 
     Args:
         entries: The functions.
-        processor: What for.
+        processors: What for; none of them need be the one that this is run on.
 
     Returns:
-        The object file.
+        The object file for each.
 
     Raises:
         ImportError: A kernel asks for something that is neither here nor in C's library.
     """
     with _translated_only(), global_compiler_lock:
         text = _translation(entries)
+    llvm.initialize_all_targets()
+    llvm.initialize_all_asmprinters()
+    return [_compiled(text, entries, processor) for processor in processors]
+
+
+def _compiled(text: str, entries: Sequence[KernelEntry], processor: Processor) -> bytes:
     module = llvm.parse_assembly(text)
     machine = processor.machine()
     module.triple, module.data_layout = processor.triple, str(machine.target_data)
