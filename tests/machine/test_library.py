@@ -12,6 +12,7 @@ import pytest
 from opspace.machine import kept_object, processor
 from opspace.machine.processor import SHIPPED, host
 from opspace.machine.sources import stamp
+from opspace.plan import entries
 from opspace.plan.entries import ENTRIES
 from opspace.record import load
 
@@ -356,6 +357,14 @@ from opspace.machine.compile_object import compile_objects
 from opspace.plan.entries import ENTRIES, KERNELS
 assert kept_object.keep(KERNELS.file_name(host()), *compile_objects(ENTRIES, [host()]))
 """
+
+
+def test_the_object_carries_its_stamp_and_no_path_of_who_made_it():
+    """Python's own errors would bring it, with the file that they come from."""
+    content = entries.KERNELS.object()
+    assert entries.KERNELS.stamp.encode() in content
+    assert b"builtins" not in content
+    assert b".py" not in content
 
 
 @pytest.mark.slow

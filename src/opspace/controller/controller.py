@@ -141,6 +141,13 @@ class Controller(ReferenceController):
         )
         return command if self._plain else self._finished(command, members)
 
+    def _added_by_robot(self) -> np.ndarray:
+        if not self._robot_adds or self._bodies is None or self._laid_out is None:
+            return super()._added_by_robot()
+        _, plan, address, *_ = self._laid_out
+        KERNELS["gravity"](address)
+        return np.nan_to_num(plan.tick.gravity, nan=0.0, posinf=0.0, neginf=0.0)
+
     def _begin_anew(self) -> None:
         super()._begin_anew()
         if self._plan is not None:

@@ -13,12 +13,13 @@ from typing import Any
 from llvmlite import binding as llvm
 from llvmlite import ir
 from numba import types
+from numba.core import cgutils
 from numba.core import config as settings
 from numba.core.compiler_lock import global_compiler_lock
 
 from opspace.machine.field_table import RecordTable
 from opspace.machine.handle_type import handle_type
-from opspace.machine.kernel_entry import Argument, KernelEntry
+from opspace.machine.kernel_entry import Argument, KernelEntry, stamp_of
 from opspace.machine.processor import Processor
 
 LIBRARY = {
@@ -26,6 +27,9 @@ LIBRARY = {
     *("sincos", "sqrt", "tan", "tanh", "memcpy", "memmove", "memset"),
 }
 """What the object may ask of the process that loads it: C's own library, nothing of Python's."""
+
+STAMP = "opspace_stamp"
+"""Symbol of the text that says what the object was made of; who links it compares."""
 
 NUMBERS = {float: types.float64, int: types.int64}
 
@@ -58,7 +62,7 @@ def _compiled(text: str, entries: Sequence[KernelEntry], processor: Processor) -
     module = llvm.parse_assembly(text)
     machine = processor.machine()
     module.triple, module.data_layout = processor.triple, str(machine.target_data)
-    seen = {entry.symbol for entry in entries}
+    seen = {STAMP, *(entry.symbol for entry in entries)}
     parts = [*module.functions, *module.global_variables]
     for number, part in enumerate(parts):
         if not part.is_declaration and part.name not in seen:
@@ -95,6 +99,8 @@ def _translation(entries: Sequence[KernelEntry]) -> str:
         compiled = kernel.overloads[signature]
         library.add_linking_library(compiled.library)
         _define(entry, compiled.fndesc, context, module)
+    said = cgutils.make_bytearray(stamp_of(entries).encode() + bytes(1))
+    cgutils.global_constant(module, STAMP, said, linkage="")
     library.add_ir_module(module)
     library.finalize()
     return library.get_llvm_str()

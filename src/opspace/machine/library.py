@@ -13,10 +13,9 @@ from llvmlite import binding as llvm
 
 from opspace.machine.compile_apart import compile_apart
 from opspace.machine.kept_object import keep, read, read_shipped, sealed, writable
-from opspace.machine.kernel_entry import KernelEntry
+from opspace.machine.kernel_entry import KernelEntry, stamp_of
 from opspace.machine.processor import SHIPPED, Processor, host
 from opspace.machine.python_call import PythonCalls
-from opspace.machine.sources import stamp
 
 log = logging.getLogger("opspace")
 
@@ -69,7 +68,11 @@ class Library:
 
     def file_name(self, processor: Processor) -> str:
         """Return the name under which the object is kept; another one is made of something else."""
-        return f"kernels-{processor.name}-{self._stamp}.o"
+        return f"kernels-{processor.name}-{self.stamp}.o"
+
+    def object(self) -> bytes:
+        """Return the object for this machine, compiled before or now, for a linker."""
+        return self._found(host())
 
     def to_ship(self) -> dict[str, bytes]:
         """Compile for every processor of `SHIPPED`.
@@ -81,11 +84,12 @@ class Library:
         return {self._shipped(p): sealed(one) for p, one in zip(SHIPPED, made, strict=True)}
 
     @cached_property
-    def _stamp(self) -> str:
-        return stamp("\n".join(entry.layout for entry in self._entries))[:32]
+    def stamp(self) -> str:
+        """What the object says of itself, and whoever relies on it must have been made for."""
+        return stamp_of(self._entries)
 
     def _shipped(self, processor: Processor) -> str:
-        return f"kernels-{processor.kind}-{self._stamp}.o"
+        return f"kernels-{processor.kind}-{self.stamp}.o"
 
     def _found(self, processor: Processor) -> bytes:
         if found := read_shipped(self._shipped(processor)):
