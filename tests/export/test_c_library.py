@@ -12,6 +12,8 @@ from opspace.export.c_library import export_c
 from opspace.plan.entries import KERNELS
 from opspace.plan.image import image
 from opspace.stack import Blending
+from tests.docs.pages import DOCS, commands_of
+from tests.docs.test_pages import programs_of, run_blocks
 
 CC = shutil.which("cc")
 with_cc = pytest.mark.skipif(CC is None, reason="no C compiler is installed (cc)")
@@ -218,6 +220,17 @@ def test_what_cannot_be_used_is_refused_and_changes_nothing(tmp_path):
     assert osc.Status(other.step(t + 0.1, q, v)[0]) & osc.Status.TIME_JUMP
     other.library.opspace_restart(other.own)
     assert other.step(t, q, v)[0] == first.status
+
+
+@with_cc
+def test_the_page_of_the_library_is_right(tmp_path):
+    page = DOCS / "how-to" / "c-library.md"
+    done = run_blocks(programs_of(page), tmp_path)
+    assert done.returncode == 0, done.stderr
+    (line,) = (one for one in commands_of(page) if one.startswith("cc "))
+    subprocess.run([CC, *STRICT, *line.split()[1:]], cwd=tmp_path, check=True)
+    done = subprocess.run([tmp_path / "hold"], capture_output=True, text=True, check=True)
+    assert done.stdout == "guest: 1\n"
 
 
 @with_cc

@@ -84,7 +84,7 @@ def _check(controller: ReferenceController) -> None:
         "a handover": controller._handover is not None,
         "a payload that is being taken": controller._loading is not None,
         "a transition on its way": not stack.settled,
-        "a request that waits in the stack": stack.waiting,
+        "a request that waits in the stack, such as an event of a scenario": stack.waiting,
     }
     for what, there in reasons.items():
         if there:

@@ -12,6 +12,7 @@ from opspace import __version__
 from opspace.command import Status
 from opspace.controller import Controller
 from opspace.controller.exported import Exported, exported
+from opspace.controller.reference import ReferenceController
 from opspace.controller.watchdog import JUMP, MISSED
 from opspace.errors import InputError
 from opspace.kernels import columns
@@ -44,7 +45,7 @@ TARGETS = {
 
 
 def export_c(
-    controller: Controller,
+    controller: ReferenceController,
     directory: Path | str,
     name: str = "controller",
     *,
@@ -58,7 +59,7 @@ def export_c(
     begins as a controller that has not ticked, with the tasks, targets and gains of this moment.
 
     Args:
-        controller: The controller.
+        controller: A `Controller`.
         directory: Where the files go; it is made.
         name: Name of the model in C, and of its files.
         absent: Names of tasks of the stack that are not there at first and come later.
