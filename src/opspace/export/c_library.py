@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
+from importlib import metadata
 from pathlib import Path
 
 import numpy as np
 
-from opspace import __version__
 from opspace.command import Status
 from opspace.controller import Controller
 from opspace.controller.exported import Exported, exported
@@ -232,4 +232,4 @@ def _text(word: str) -> str:
 
 
 def _written() -> str:
-    return f"/* Written by opspace {__version__} for {host().cpu}. */\n"
+    return f"/* Written by opspace {metadata.version('opspace')} for {host().cpu}. */\n"
