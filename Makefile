@@ -71,7 +71,7 @@ test-lowest: $(INSTALLED)
 
 test-slow: $(INSTALLED)
 	$(BIN)/python -m pytest -m slow
-	OPSPACE_CAMPAIGN=1 $(BIN)/python -m pytest -n 2 tests/law -k continuous
+	OPSPACE_CAMPAIGN=1 $(BIN)/python -m pytest -n 2 tests/law tests/stack/test_programs.py tests/scenario/test_fuzz_at_run_time.py
 
 test-browser: $(INSTALLED)
 	$(BIN)/python -m pytest -m browser
