@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 import opspace as osc
-from opspace.sim import Ground
+from opspace.sim import Disturbances, Ground, Push
+from opspace.sim.disturbances import NO_DISTURBANCES
 
 HALF, OFFSET = (0.085, 0.025), (0.035, 0.0, -0.035)
 WEIGHT = 33.34114202 * 9.81
@@ -16,8 +17,8 @@ LIFTED = np.array([0.05, 0.0, 0.06])
 class Show:
     """A standing G1 with everything that is asked of it, and what was measured on the way."""
 
-    def __init__(self, hard=False):
-        robot = self.robot = osc.load_robot("g1")
+    def __init__(self, hard=False, disturbances=NO_DISTURBANCES, tool=None):
+        robot = self.robot = osc.load_robot("g1", tool=tool)
         self.soles = {
             side: osc.SoleContact(f"{side}_ankle_roll_link", HALF, offset=OFFSET, name=side)
             for side in ("left", "right")
@@ -41,7 +42,7 @@ class Show:
         self.stack = osc.Stack([limits, *tasks], contacts=list(self.soles.values()))
         self.controller = osc.Controller(robot, self.stack, torque_limits="priority")
         ground = Ground(list(self.soles.values()))
-        self.plant = osc.Plant(robot, q, ground=ground, substeps=2)
+        self.plant = osc.Plant(robot, q, ground=ground, substeps=2, disturbances=disturbances)
         self.hard = hard
         self.steps, self.forces, self.errors = (defaultdict(float) for _ in range(3))
         self._tau, self._measured, self._planned = None, None, None
@@ -94,9 +95,9 @@ class Show:
         return self.plant.contact_forces["right"][2] > 0.02 * WEIGHT
 
 
-def show(*, hard=False):
+def show(*, hard=False, disturbances=NO_DISTURBANCES):
     """Everything once."""
-    s = Show(hard)
+    s = Show(hard, disturbances)
     s.go("stand", 0.3)
     s.shift(s.middle, s.over, "shift")
     s.lift()
@@ -181,3 +182,26 @@ def test_a_lift_that_is_turned_around_half_way():
     assert command.contacts["right"].activation == 1.0
     assert s.steps["turned"] <= 0.15
     assert s.errors["turned"] <= 2e-3
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(3))
+def test_wrong_masses_move_the_robot_little_and_the_torque_not_in_steps(seed):
+    s = show(disturbances=Disturbances(mass_error=0.1, seed=seed))
+    assert max(s.steps.values()) <= 0.5
+    assert max(s.errors.values()) <= 4e-3
+    assert s.plant.q[2] > 0.7
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("axis", [0, 1])
+def test_a_push_of_eight_newton_seconds_at_the_pelvis(axis):
+    push = Push(0.1, 0.1, 80.0 * np.eye(3)[axis])
+    s = Show(disturbances=Disturbances(pushes=[push]), tool="pelvis")
+    s.go("before", 0.1)
+    s.go("pushed", 0.103)
+    s.go("after", 1.0)
+    assert s.steps["after"] <= 1.0
+    assert max(s.errors.values()) <= 15e-3
+    assert s.errors["after"] > 1e-3
+    assert s.plant.q[2] > 0.7
