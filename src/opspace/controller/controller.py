@@ -46,7 +46,16 @@ from opspace.stack import Blending, Member, Outlook, variables_of
 from opspace.tasks.task import CHANGES
 from opspace.tasks.validation import finite, numbers
 
-STATUSES = tuple(map(Status, range(SOLVE)))
+
+class _Statuses(dict[int, Status]):
+    """Flags by their number; making one costs more than a tick, making all of them a second."""
+
+    def __missing__(self, bits: int) -> Status:
+        found = self[bits] = Status(bits)
+        return found
+
+
+STATUSES = _Statuses()
 NEW = tuple.__new__
 KEPT = 32
 """Plans that are kept for stacks to come again."""
@@ -257,6 +266,8 @@ class Controller(ReferenceController):
             return f"the law of {type(limits).__name__}"
         if self._rules.law is not sum_of_hard_torques:
             return "a law of one's own"
+        if self._collisions is not None:
+            return "collision avoidance"
         blending = type(self._blending)
         return "" if blending is Blending else f"the blending {blending.__name__}"
 
