@@ -59,7 +59,8 @@ def rows_of(layout: DistanceLayout, robot: Robot) -> DistanceRows:
 def _points(layout: DistanceLayout, robot: Robot) -> Points:
     """Motion of the centres of all balls."""
     count = layout.ball_frame.size
-    found = Points(*(np.zeros((count, 3)) for _ in range(3)), np.zeros((count, 3, robot.nv)))
+    none = np.zeros((count, 3))
+    found = Points(none.copy(), none.copy(), none.copy(), np.zeros((count, 3, robot.nv)))
     for i, (frame, centre) in enumerate(zip(layout.ball_frame, layout.ball_centre, strict=True)):
         position, V, A, J = _moved(robot, int(frame), robot.rotation(int(frame)) @ centre)
         found.position[i], found.velocity[i] = position, V[:3]

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 
 from opspace.errors import InputError, unknown_name
+from opspace.law.scalars import RETURN_SPEED
 from opspace.robots.protocol import Robot
 from opspace.robots.shapes import LinkCapsule, joints_that_move, shapes_of
 from opspace.robots.touching import Pairs, pairs_of
@@ -124,6 +126,27 @@ class CollisionAvoidance:
         """
         gone = [self[name] for name in names]
         self._change(tuple(o for o in self._obstacles if o not in gone))
+
+    def clearance_lost(self, speed: float) -> float:
+        """How much nearer than the margin an obstacle comes that hides its speed, m.
+
+        The arm stays where it retreats as fast as the obstacle follows, u: at D < 0 with
+        −v_adm(D) = u (1 + v_adm'(D)/k₂), v_adm and its slope those of joints beyond their limits.
+
+        Args:
+            speed: u, m/s.
+
+        Returns:
+            −D; inf from the speed on with which it retreats at most, `opspace.law.scalars.RETURN_SPEED`.
+        """
+        share = abs(finite(speed, "the speed of an obstacle")) / RETURN_SPEED
+        if share >= 1.0:
+            return math.inf
+        slope = share * self.k1 / self.k2
+        if slope == 0.0:
+            return 0.0
+        y = (math.sqrt(1.0 + 4.0 * slope * (share + slope)) - 1.0) / (2.0 * slope)
+        return RETURN_SPEED / self.k1 * math.atanh(y)
 
     def bind(self, robot: Robot) -> None:
         """Find the links of a robot, their shapes and the pairs that are to be watched.
