@@ -113,10 +113,11 @@ _NAMES = {
     "opspace.stack": "Stack",
     "opspace.tasks": (
         "ActivationProduct Ball Box Capsule Chain Circle CollisionAvoidance ComTask Constant "
-        "DistanceBuffer HalfSpace JerkLimited JointBuffer JointLimits JointTask MinimumJerk "
-        "OrientationJerkLimited OrientationMinimumJerk OrientationTask PoseReference PoseTask "
-        "PositionTask PostureTask Reference RelativeOrientationTask RelativePoseTask "
-        "RelativePositionTask Sample Task TaskTerms TrackingTask ViaPoints"
+        "DistanceBuffer HalfSpace JerkLimited JointBuffer "
+        "JointLimits JointTask MinimumJerk OrientationJerkLimited OrientationMinimumJerk "
+        "OrientationTask PoseReference PoseTask PositionTask PostureTask Reference "
+        "RelativeOrientationTask RelativePoseTask RelativePositionTask Sample Task TaskTerms "
+        "TrackingTask ViaPoints"
     ),
     "opspace.view": "RunRequest Viewer",
 }

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from opspace.kernels.algebra import cholesky, solve_lower, solve_lower_transposed
+from opspace.kernels.algebra import cholesky, cholesky_row, solve_lower, solve_lower_transposed
 from opspace.kernels.compiled_scalars import level_weight
 from opspace.kernels.distances import faster
 from opspace.kernels.inertia import acceleration_of, unit_row, whiten, whitened_of
@@ -169,12 +169,12 @@ def _project(count, n, bounds):
         if worst < 0:
             break
         bounds.active[size] = worst
-        size += 1
+        known, size = size, size + 1
         while size > 0:
-            _multipliers(n, size, bounds)
+            _multipliers(n, known, size, bounds)
             if _advance(size, bounds):
                 break
-            size = _drop(size, bounds)
+            known, size = 0, _drop(size, bounds)
         for a in range(n):
             bounds.y[a] = bounds.x[a]
             for k in range(size):
@@ -203,10 +203,15 @@ def _most_broken(count, n, size, bounds):
 
 
 @jit
-def _multipliers(n, size, bounds):
-    """Solve (N Nᵀ + softness) λ = N x − bound for the bounds that hold."""
+def _multipliers(n, known, size, bounds):
+    """Solve (N Nᵀ + softness) λ = N x − bound for the bounds that hold, of which some are factored."""
     for k in range(size):
         i = bounds.active[k]
+        bounds.r[k] = -bounds.bound[i]
+        for a in range(n):
+            bounds.r[k] += bounds.normal[i, a] * bounds.x[a]
+        if k < known:
+            continue
         for b in range(k + 1):
             j = bounds.active[b]
             product = 0.0
@@ -214,10 +219,7 @@ def _multipliers(n, size, bounds):
                 product += bounds.normal[i, a] * bounds.normal[j, a]
             bounds.G[k, b] = product
         bounds.G[k, k] += bounds.softness[i]
-        bounds.r[k] = -bounds.bound[i]
-        for a in range(n):
-            bounds.r[k] += bounds.normal[i, a] * bounds.x[a]
-    cholesky(bounds.G, size, 0.0, bounds.factor)
+        cholesky_row(bounds.G, k, 0.0, bounds.factor)
     solve_lower(bounds.factor, size, bounds.r)
     solve_lower_transposed(bounds.factor, size, bounds.r)
     for k in range(size):
