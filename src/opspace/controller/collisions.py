@@ -29,10 +29,10 @@ class DistanceTerms(NamedTuple):
     most: np.ndarray
 
 
-def distance_terms(guard: CollisionAvoidance, robot: Robot) -> DistanceTerms:
-    """Evaluate all distances of a guard at the robot's present state."""
+def distance_terms(guard: CollisionAvoidance, robot: Robot, t: float) -> DistanceTerms:
+    """Evaluate all distances of a guard at the robot's present state and at time t, s."""
     layout = guard.layout()
-    rows = rows_of(layout, robot)
+    rows = rows_of(layout, robot, t)
     balls, sets = layout.rows[:, 0], layout.rows[:, 1]
     distance = rows.distance - layout.ball_radius[balls] - layout.set_radius[sets]
     D = distance - guard.margin
@@ -43,10 +43,10 @@ def distance_terms(guard: CollisionAvoidance, robot: Robot) -> DistanceTerms:
     return DistanceTerms(layout, distance, -rows.G, np.array(most))
 
 
-def rows_of(layout: DistanceLayout, robot: Robot) -> DistanceRows:
+def rows_of(layout: DistanceLayout, robot: Robot, t: float) -> DistanceRows:
     """Evaluate the distances of centres of balls to sets that are not grown by their radii."""
     points = _points(layout, robot)
-    bodies = _bodies(layout, robot)
+    bodies = _bodies(layout, robot, t)
     balls, sets = layout.rows[:, 0], layout.rows[:, 1]
     return distance_rows(
         Points._make(part[balls] for part in points),
@@ -68,7 +68,7 @@ def _points(layout: DistanceLayout, robot: Robot) -> Points:
     return found
 
 
-def _bodies(layout: DistanceLayout, robot: Robot) -> Bodies:
+def _bodies(layout: DistanceLayout, robot: Robot, t: float) -> Bodies:
     """Motion of all sets, those of links and those of obstacles."""
     count, n = layout.set_frame.size, robot.nv
     found = Bodies(
@@ -88,7 +88,7 @@ def _bodies(layout: DistanceLayout, robot: Robot) -> Bodies:
             robot, frame, arm
         )
     for i, obstacle in enumerate(layout.obstacles, links):
-        found.rotation[i], found.position[i], found.velocity[i] = obstacle.placing
+        found.rotation[i], found.position[i], found.velocity[i] = obstacle.placing(t)
     return found
 
 

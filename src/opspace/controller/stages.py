@@ -323,7 +323,7 @@ def torque(k: Given, gamma: np.ndarray) -> np.ndarray:
 def measure_distances(k: Given) -> DistanceTerms | None:
     """How far bodies are apart that must not touch, and how fast each distance may shrink."""
     guard = k.rules.guard
-    return None if guard is None else distance_terms(guard, k.robot)
+    return None if guard is None else distance_terms(guard, k.robot, k.t)
 
 
 def keep_bounds(

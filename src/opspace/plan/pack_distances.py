@@ -44,13 +44,17 @@ class PackedDistances:
                 d.set_local[i, :9], d.set_local[i, 9:] = R.T.reshape(9), p
         d.extent[:, :3], d.extent[:, 3:6] = layout.lower, layout.upper
         d.extent[:, 6] = layout.set_radius
-        self.refresh()
 
-    def refresh(self) -> None:
-        """Bring the obstacles up to date."""
+    @property
+    def moving(self) -> bool:
+        """Whether an obstacle follows a reference in time."""
+        return any(obstacle.moving for obstacle in self.layout.obstacles)
+
+    def refresh(self, t: float) -> None:
+        """Bring the obstacles up to date at a time, s."""
         d, obstacles = self._distances, self.layout.obstacles
         for i, obstacle in enumerate(obstacles, d.set_local.shape[0] - len(obstacles)):
-            R, p, velocity = obstacle.placing
+            R, p, velocity = obstacle.placing(t)
             d.set_local[i, :9], d.set_local[i, 9:], d.twist[i] = R.T.reshape(9), p, velocity
 
 

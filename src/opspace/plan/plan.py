@@ -128,7 +128,9 @@ class Plan:
             self.distances = PackedDistances(guard, layout, axes, self.tick)
         # Where everything is known ahead, the first tick need not look.
         self.moving = False
-        self.seen: object = last if all(packed.settled for packed in self.packed) else None
+        self.seen: object = None
+        if guard is None and all(packed.settled for packed in self.packed):
+            self.seen = last
         # As bytes: arrays take several times as long to read and write them.
         self._ramps = self.tick.variable.reshape(-1).view(np.uint8).data
         self._groups = self.tick.group.view(np.uint8).data
@@ -163,8 +165,9 @@ class Plan:
         for packed in self.packed:
             packed.refresh(robot, t)
         if self.distances is not None:
-            self.distances.refresh()
+            self.distances.refresh(t)
         self.moving = any(packed.moving for packed in self.packed)
+        self.moving |= self.distances is not None and self.distances.moving
         self.seen = last
 
     def disturb(self, acceleration: np.ndarray) -> None:

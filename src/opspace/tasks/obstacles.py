@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from typing import NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from opspace.errors import InputError
+from opspace.tasks.references.sample import Reference
 from opspace.tasks.rotation import as_rotation
 from opspace.tasks.task import CHANGES
 from opspace.tasks.validation import Array, finite_array, numbers, positive
@@ -50,7 +51,7 @@ class Obstacle:
         name: str,
         extent: tuple[ArrayLike, ArrayLike],
         radius: float,
-        position: ArrayLike,
+        position: ArrayLike | Reference,
         rotation: ArrayLike,
         velocity: ArrayLike,
         ignore: Iterable[str],
@@ -64,35 +65,57 @@ class Obstacle:
         self.lower, self.upper = np.array(extent[0], float), np.array(extent[1], float)
         self.radius = radius
         # One record, assigned once: a tick in another thread sees the old place or the new one.
-        self._placing = self._placed(position, rotation, velocity)
+        self._state = self._told(position, rotation, velocity, _NONE)
 
     def __repr__(self) -> str:
         x, y, z = self.position.tolist()
         return f"{type(self).__name__}({self.name!r}, at {x:.3g}, {y:.3g}, {z:.3g})"
 
     @property
-    def placing(self) -> Placing:
-        """Where it is and how it moves, all of one moment."""
-        return self._placing
-
-    @property
     def position(self) -> Array:
-        """Where its origin is, (3,) m."""
-        return self._placing.position
+        """Where its origin is, or was at the last tick where it follows a reference, (3,) m."""
+        return self._state[0].position
 
     @property
     def rotation(self) -> Array:
         """Its axes, (3, 3)."""
-        return self._placing.rotation
+        return self._state[0].rotation
 
     @property
     def velocity(self) -> Array:
         """How it moves, (6,) linear then angular, m/s and rad/s."""
-        return self._placing.velocity
+        return self._state[0].velocity
+
+    @property
+    def moving(self) -> bool:
+        """Whether it follows a reference in time."""
+        return self._state[1] is not None
+
+    def placing(self, t: float) -> Placing:
+        """Tell where it is and how it moves at one moment.
+
+        Args:
+            t: Time, s.
+
+        Raises:
+            InputError: Its reference gave something else than a position (3,).
+        """
+        found = self._state
+        here, path = found
+        if path is None:
+            return here
+        begin = getattr(path, "begin_at", None)
+        path = path if begin is None else begin(t)
+        sample = path(t)
+        speed = sample.v if np.size(sample.v) else _NONE
+        here, _ = self._told(sample.x, here.rotation, speed, _NONE)
+        if self._state is found:  # nobody has placed it meanwhile
+            self._state = here, path
+        return here
 
     def place(
         self,
-        position: ArrayLike | None = None,
+        position: ArrayLike | Reference | None = None,
         rotation: ArrayLike | None = None,
         velocity: ArrayLike | None = None,
     ) -> None:
@@ -103,30 +126,43 @@ class Obstacle:
         the arm may do.
 
         Args:
-            position: (3,) of its origin, m; None is where it was.
+            position: (3,) of its origin, m, or a reference in time that it follows, with its velocity;
+                None is where it was.
             rotation: (3, 3) or quaternion wxyz; None is as it was.
             velocity: (3,) linear or (6,) linear and angular, m/s and rad/s; None is none.
 
         Raises:
             InputError: A wrong shape or a number that is not finite.
         """
-        here = self._placing
-        self._placing = self._placed(
+        here, _ = self._state
+        self._state = self._told(
             here.position if position is None else position,
             here.rotation if rotation is None else rotation,
             _STILL if velocity is None else velocity,
+            here.position,
         )
         CHANGES.last = object()
 
-    def _placed(self, position: ArrayLike, rotation: ArrayLike, velocity: ArrayLike) -> Placing:
+    def _told(
+        self,
+        position: ArrayLike | Reference,
+        rotation: ArrayLike,
+        velocity: ArrayLike,
+        before: ArrayLike,
+    ) -> tuple[Placing, Reference | None]:
         given = numbers(velocity, f"the velocity of {self.name!r}")
         if given.shape == (3,):
             given = np.concatenate([given, _NONE])
+        path: Any = position if callable(position) else None
         return Placing(
             as_rotation(rotation, f"the rotation of {self.name!r}"),
-            finite_array(position, (3,), f"the position of {self.name!r}"),
+            finite_array(
+                before if path is not None else cast("ArrayLike", position),
+                (3,),
+                f"the position of {self.name!r}",
+            ),
             finite_array(given, (6,), f"the velocity of {self.name!r}"),
-        )
+        ), path
 
 
 class Ball(Obstacle):
@@ -134,7 +170,7 @@ class Ball(Obstacle):
 
     Args:
         radius: m.
-        position: (3,) of its centre, m.
+        position: (3,) of its centre, m, or a reference in time.
         velocity: (3,) m/s.
         name: Its name.
         ignore: Links that need not stay away from it.
@@ -146,7 +182,7 @@ class Ball(Obstacle):
     def __init__(
         self,
         radius: float,
-        position: ArrayLike = _NONE,
+        position: ArrayLike | Reference = _NONE,
         *,
         velocity: ArrayLike = _STILL,
         name: str = "ball",
@@ -162,7 +198,7 @@ class Capsule(Obstacle):
     Args:
         radius: m.
         length: Of the part between the ends, m.
-        position: (3,) of its middle, m.
+        position: (3,) of its middle, m, or a reference in time.
         rotation: Its axes, (3, 3) or quaternion wxyz.
         velocity: (3,) or (6,), m/s and rad/s.
         name: Its name.
@@ -176,7 +212,7 @@ class Capsule(Obstacle):
         self,
         radius: float,
         length: float,
-        position: ArrayLike = _NONE,
+        position: ArrayLike | Reference = _NONE,
         rotation: ArrayLike = _UPRIGHT,
         *,
         velocity: ArrayLike = _STILL,
@@ -193,7 +229,7 @@ class Box(Obstacle):
 
     Args:
         size: (3,) length of its sides, m.
-        position: (3,) of its middle, m.
+        position: (3,) of its middle, m, or a reference in time.
         rotation: Its axes, (3, 3) or quaternion wxyz.
         velocity: (3,) or (6,), m/s and rad/s.
         name: Its name.
@@ -206,7 +242,7 @@ class Box(Obstacle):
     def __init__(
         self,
         size: ArrayLike,
-        position: ArrayLike = _NONE,
+        position: ArrayLike | Reference = _NONE,
         rotation: ArrayLike = _UPRIGHT,
         *,
         velocity: ArrayLike = _STILL,
