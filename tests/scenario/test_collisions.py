@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import opspace as osc
+from opspace.runs.run import run_scenario
 from opspace.scenario.build import build
 from opspace.scenario.load import load_scenario, scenario_from
 
@@ -55,6 +56,16 @@ def test_what_a_shape_does_not_have_is_refused_with_its_key(entry, said):
 @pytest.mark.parametrize("name", ["table", "self-fold", "moving-ball", "gap"])
 def test_shipped_scenes_can_be_built(name):
     assert build(load_scenario(name)).controller.collisions.layout().rows.size
+
+
+def test_a_recording_tells_the_nearest_pair_and_is_the_same_again(tmp_path):
+    ball = {**BALL, "position": [0.9, -0.15, 0.8], "velocity": [-0.5, 0.0, 0.0]}
+    run_scenario(scenario({"ball": ball}), tmp_path / "run")
+    recording = osc.load(tmp_path / "run")
+    least = recording["distances/least"]
+    assert np.all(np.diff(least) < 0.0)
+    again = build(scenario({"ball": ball}))
+    assert osc.replay(recording, again.controller).gap == 0.0
 
 
 @pytest.mark.slow
