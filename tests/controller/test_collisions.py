@@ -9,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import opspace as osc
+from opspace.controller.exported import exported
 from opspace.controller.reference import ReferenceController
 from opspace.law.scalars import allowed_speed
 
@@ -267,6 +268,8 @@ def test_what_cannot_be_used_is_refused_by_name():
         osc.CollisionAvoidance().remove("ball")
     with pytest.raises(osc.InputError, match="not Box"):
         arm(osc.Controller, collisions=osc.Box((1, 1, 1)))
-    _, guard = arm(osc.Controller)
+    controller, guard = arm(osc.Controller)
+    with pytest.raises(osc.InputError, match="cannot have collisions"):
+        exported(controller, (), "quintic")
     with pytest.raises(osc.InputError, match="puma560"):
         arm(osc.Controller, collisions=guard)
