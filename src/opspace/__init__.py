@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from opspace.command import Command as Command
+    from opspace.command import Distance as Distance
     from opspace.command import LevelStatus as LevelStatus
     from opspace.command import Status as Status
     from opspace.command import TaskStatus as TaskStatus
@@ -52,14 +53,20 @@ if TYPE_CHECKING:
     from opspace.robots import RobotInfo as RobotInfo
     from opspace.robots import available_robots as available_robots
     from opspace.robots import load_robot as load_robot
+    from opspace.robots.shapes import LinkCapsule as LinkCapsule
     from opspace.sim import Plant as Plant
     from opspace.stack import Stack as Stack
     from opspace.tasks import ActivationProduct as ActivationProduct
+    from opspace.tasks import Ball as Ball
+    from opspace.tasks import Box as Box
+    from opspace.tasks import Capsule as Capsule
     from opspace.tasks import Chain as Chain
     from opspace.tasks import Circle as Circle
+    from opspace.tasks import CollisionAvoidance as CollisionAvoidance
     from opspace.tasks import ComTask as ComTask
     from opspace.tasks import Constant as Constant
     from opspace.tasks import DistanceBuffer as DistanceBuffer
+    from opspace.tasks import HalfSpace as HalfSpace
     from opspace.tasks import JerkLimited as JerkLimited
     from opspace.tasks import JointBuffer as JointBuffer
     from opspace.tasks import JointLimits as JointLimits
@@ -85,7 +92,7 @@ if TYPE_CHECKING:
     from opspace.view import Viewer as Viewer
 
 _NAMES = {
-    "opspace.command": "Command LevelStatus Status TaskStatus",
+    "opspace.command": "Command Distance LevelStatus Status TaskStatus",
     "opspace.controller": "Controller",
     "opspace.errors": (
         "InputError MissingExtraError ModelError ModelWarning OpspaceError RecordingError ScenarioError "
@@ -100,13 +107,15 @@ _NAMES = {
     "opspace.record.observer": "TickRecorder",
     "opspace.record.replay": "Replay replay",
     "opspace.robots": "Payload Robot RobotInfo available_robots load_robot",
+    "opspace.robots.shapes": "LinkCapsule",
     "opspace.loop": "AnyPlant Observer Outcome Stepping StopRule simulate",
     "opspace.plan.calibration": "Calibration",
     "opspace.plan.scales": "Singularity",
     "opspace.sim": "Plant",
     "opspace.stack": "Stack",
     "opspace.tasks": (
-        "ActivationProduct Chain Circle ComTask Constant DistanceBuffer JerkLimited JointBuffer "
+        "ActivationProduct Ball Box Capsule Chain Circle CollisionAvoidance ComTask Constant "
+        "DistanceBuffer HalfSpace JerkLimited JointBuffer "
         "JointLimits JointTask MinimumJerk OrientationJerkLimited OrientationMinimumJerk "
         "OrientationTask PoseReference PoseTask PositionTask PostureTask Reference "
         "RelativeOrientationTask RelativePoseTask RelativePositionTask Sample Task TaskTerms "

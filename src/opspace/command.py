@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Flag, IntFlag
 from typing import NamedTuple, Protocol
 
@@ -36,6 +36,10 @@ class Status(IntFlag):
     joint came too fast to be stopped at its limit."""
     HANDOVER = 1024
     """The torque is on its way from or to another controller's."""
+    COLLISION = 8192
+    """A pair of bodies is kept from coming nearer: tasks get less than they ask for."""
+    COLLISION_LOST = 16384
+    """No torque of the motors keeps every pair of bodies apart, and the excess is as small as can be."""
     FAULT = 8
     """No finite torque was found; the command is bias compensation with damping."""
 
@@ -87,8 +91,27 @@ class LevelStatus:
     scale: float = 1.0
 
 
+@dataclass(frozen=True, slots=True)
+class Distance:
+    """Two bodies in one tick.
+
+    Attributes:
+        distance: Between their shapes, m; below zero where they overlap.
+        taken: By how much the pair slows down how fast its distance shrinks, m/s²; 0 where it does
+            not act.
+    """
+
+    distance: float
+    taken: float
+
+
 class Report(Protocol):
     """What a tick tells about tasks, levels and limits, perhaps worked out only when asked."""
+
+    @property
+    def distances(self) -> Mapping[str, Distance]:
+        """Pairs of bodies that are kept apart, by "body/body", the nearest first."""
+        ...
 
     @property
     def tasks(self) -> Mapping[str, TaskStatus]:
@@ -113,6 +136,7 @@ class Found:
     tasks: Mapping[str, TaskStatus]
     levels: tuple[LevelStatus, ...]
     limits: Mapping[str, float]
+    distances: Mapping[str, Distance] = field(default_factory=dict)
 
 
 class Command(NamedTuple):
@@ -151,3 +175,8 @@ class Command(NamedTuple):
     def limits(self) -> Mapping[str, float]:
         """Activation of the joint-limit tasks that are not at 0, by "joint/side"."""
         return self.report.limits
+
+    @property
+    def distances(self) -> Mapping[str, Distance]:
+        """Pairs of bodies that are kept apart, by "body/body", the nearest first."""
+        return self.report.distances

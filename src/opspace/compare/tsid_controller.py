@@ -48,6 +48,8 @@ class TsidController(ReferenceController):
         robot = self.robot
         robot.update(q, v)
         if self._program is None:
+            if self.collisions is not None:
+                raise InputError("this form of TSID keeps nothing apart: run it without collisions")
             self._program = Program(self)
         members = self.stack.begin_tick(float(t))
         tau, solved = self._program.solve(t, q, v, members)

@@ -8,8 +8,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from opspace.command import Status
+from opspace.controller.collisions import DistanceTerms
 from opspace.controller.limit_task_sets import LimitTerms
-from opspace.law import BROKEN, LOST, Nearest, excess, nearest_acceleration
+from opspace.law import BROKEN, LOST, Nearest, excess, excess_of_rows, nearest_acceleration
 from opspace.robots.protocol import Robot
 
 
@@ -22,6 +23,7 @@ class Bounds:
         M: (n, n) inertia.
         bias: (n,) Coriolis, centrifugal and gravity torque, N·m.
         room: (n,) what the motors give, N·m; inf where they are not asked.
+        distances: Distances that may shrink only so fast; None for none.
         lower: (n,) least accelerations, rad/s².
         upper: (n,) largest accelerations, rad/s².
     """
@@ -30,6 +32,7 @@ class Bounds:
     M: np.ndarray
     bias: np.ndarray
     room: np.ndarray
+    distances: DistanceTerms | None = None
     lower: np.ndarray = field(init=False)
     upper: np.ndarray = field(init=False)
 
@@ -75,13 +78,20 @@ class Bounds:
     def broken(self, tau: np.ndarray, acceleration: np.ndarray) -> bool:
         """Tell whether a torque or its acceleration is outside."""
         above = np.any(np.abs(tau) > self.room * (1.0 + BROKEN))
-        return bool(above) or excess(acceleration, self.lower, self.upper) > BROKEN
+        joints = excess(acceleration, self.lower, self.upper) > BROKEN
+        return bool(above) or joints or self.approach(acceleration) > BROKEN
+
+    def approach(self, acceleration: np.ndarray) -> float:
+        """Tell by how much distances shrink faster than they may, as `opspace.law.excess` does."""
+        if self.distances is None:
+            return -np.inf
+        return excess_of_rows(acceleration, self.distances.G, self.distances.most)
 
 
 def realise(
     bounds: Bounds, tau: np.ndarray, metric: Callable[[], np.ndarray]
-) -> tuple[np.ndarray, Status, dict[str, float]]:
-    """Replace a torque by the nearest one with which no joint and no motor does more than it may.
+) -> tuple[np.ndarray, Status, dict[str, float], np.ndarray]:
+    """Replace a torque by the nearest one with which no joint, motor or distance does more than it may.
 
     Args:
         bounds: What they may.
@@ -89,13 +99,16 @@ def realise(
         metric: Gives W, in which "near" is measured; asked only where something is outside.
 
     Returns:
-        The torque, what happened, and by name how much each limit acts: the acceleration that it
-        takes from its joint, as a part of its margin, at most 1.
+        The torque, what happened, by name how much each limit acts: the acceleration that it takes
+        from its joint, as a part of its margin, at most 1; and what each distance takes from how fast
+        it shrinks, (rows,) m/s².
     """
     M, bias = bounds.M, bounds.bias
     acceleration = np.linalg.solve(M, tau - bias)
+    near = bounds.distances
     if not bounds.broken(tau, acceleration):
-        return tau, Status.LIMIT_LOST if bounds.lost(acceleration) else Status.OK, {}
+        nothing = np.zeros(0 if near is None else near.most.size)
+        return tau, Status.LIMIT_LOST if bounds.lost(acceleration) else Status.OK, {}, nothing
     found = nearest_acceleration(
         np.linalg.cholesky(M),
         metric(),
@@ -104,6 +117,8 @@ def realise(
         bounds.upper,
         -bounds.room - bias,
         bounds.room - bias,
+        None if near is None else near.G,
+        None if near is None else near.most,
     )
     tau = np.clip(M @ found.acceleration + bias, -bounds.room, bounds.room)
     status = Status.FILTERED
@@ -111,7 +126,11 @@ def realise(
         status |= Status.TORQUE_SCALED
     if bounds.lost(found.acceleration):
         status |= Status.LIMIT_LOST
-    return tau, status, _acting(bounds.terms, found)
+    if np.any(found.rows > 0.0):
+        status |= Status.COLLISION
+    if bounds.approach(found.acceleration) > LOST:
+        status |= Status.COLLISION_LOST
+    return tau, status, _acting(bounds.terms, found), found.rows
 
 
 def change_within_tick(

@@ -46,7 +46,16 @@ from opspace.stack import Blending, Member, Outlook, variables_of
 from opspace.tasks.task import CHANGES
 from opspace.tasks.validation import finite, numbers
 
-STATUSES = tuple(map(Status, range(SOLVE)))
+
+class _Statuses(dict[int, Status]):
+    """Flags by their number; making one costs more than a tick, making all of them a second."""
+
+    def __missing__(self, bits: int) -> Status:
+        found = self[bits] = Status(bits)
+        return found
+
+
+STATUSES = _Statuses()
 NEW = tuple.__new__
 KEPT = 32
 """Plans that are kept for stacks to come again."""
@@ -128,6 +137,8 @@ class Controller(ReferenceController):
                 return self._answer(t, members, STATUSES[timing])
         _, plan, address, torque, memory = laid_out
         if plan.moving or CHANGES.last is not plan.seen:
+            if plan.distances is not None and not self._watches_all(plan):
+                _, plan, address, torque, memory = self._lay_out_anew(members)
             plan.refresh(robot, t)
         answer = tick(t, address) if observer is None else self._learn(t, observer)
         if answer < 0:
@@ -209,7 +220,8 @@ class Controller(ReferenceController):
         check_members(members)
         batch = self._batch
         threads = threads or cores()
-        if batch is None or batch.members is not members or batch.threads != threads:
+        same = batch is not None and batch.members is members and batch.threads == threads
+        if batch is None or not same or not self._watches_all(batch.plan):
             batch = self._batch = self._batched(members, threads)
         if self._observer is not None:
             batch.disturb(self._observer.acceleration)
@@ -294,7 +306,9 @@ class Controller(ReferenceController):
             copies, plan = outlook.copies, None
             if Plan.fits(copies):
                 key = structure(copies)
-                plan = ready.get(key) or known.get(key) or self._planned(copies, axes)
+                plan = ready.get(key) or known.get(key)
+                if plan is None or not self._watches_all(plan):
+                    plan = self._planned(copies, axes)
                 ready[key] = plan
                 if before is not None and last is not None:
                     ramps = tuple(variable.ramp for variable in variables_of(copies))
@@ -309,7 +323,7 @@ class Controller(ReferenceController):
     def _lay_out(self, members: tuple[Member, ...]) -> _LaidOut | None:
         """Take up the plan for these tasks, or None where there are too many of them."""
         found = self._ahead.get(id(members))
-        if found is None or not found[0].holds(self._plan):
+        if found is None or not found[0].holds(self._plan) or not self._watches_all(found[1][1]):
             found = self._laid_out_now(members)
             if found is None:
                 return None
@@ -327,7 +341,7 @@ class Controller(ReferenceController):
         assert self._axes is not None
         before, key = self._plan, structure(members)
         plan = before if before is not None and before.structure == key else self._ready.get(key)
-        if plan is None:
+        if plan is None or not self._watches_all(plan):
             if not Plan.fits(members):
                 return None
             plan = self._planned(members, self._axes)
@@ -351,7 +365,20 @@ class Controller(ReferenceController):
             self.robot.torque_limit,
             self._options(),
             self._blending,
+            self._collisions,
         )
+
+    def _watches_all(self, plan: Plan) -> bool:
+        """Tell whether a plan knows of all obstacles that there are now."""
+        if self._collisions is None or plan.distances is None:
+            return True
+        return plan.distances.layout is self._collisions.layout()
+
+    def _lay_out_anew(self, members: tuple[Member, ...]) -> _LaidOut:
+        """Go on with the same tasks and other obstacles."""
+        laid_out = self._lay_out(members)
+        assert laid_out is not None
+        return laid_out
 
     def _options(self) -> np.ndarray:
         option = np.zeros(OPTION_SIZE)

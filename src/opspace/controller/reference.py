@@ -24,7 +24,7 @@ from opspace.robots.adapter import AdapterBase
 from opspace.robots.payload import Payload
 from opspace.robots.protocol import Robot
 from opspace.stack import Blending, Member, Stack
-from opspace.tasks import JointLimits, Task, TrackingTask
+from opspace.tasks import CollisionAvoidance, JointLimits, Task, TrackingTask
 from opspace.tasks.validation import finite, numbers
 
 BIASES = ("joint", "task")
@@ -69,6 +69,7 @@ class ReferenceController:
             does nothing of it.
         on_time_jump: What happens when time runs backwards or jumps, see
             `opspace.controller.watchdog.POLICIES`; it needs ``period``.
+        collisions: What is kept apart: the robot's own links, and obstacles; None for nothing.
         law: Torque of task sets, to compare with the library's own; see
             `opspace.controller.stages.Question` for what it is asked.
 
@@ -91,6 +92,7 @@ class ReferenceController:
         torque_limits: str = "report",
         period: float | None = None,
         on_time_jump: str = "report",
+        collisions: CollisionAvoidance | None = None,
         law: Law = sum_of_hard_torques,
     ) -> None:
         self._blending = blending if isinstance(blending, Blending) else Blending(blending)
@@ -129,6 +131,13 @@ class ReferenceController:
         self.calibration = self._scales.calibration(list(stack))
         if stack.limits is not None:
             stack.limits.bind(robot, self.calibration.brake)
+        if collisions is not None:
+            if not isinstance(collisions, CollisionAvoidance):
+                raise InputError(
+                    f"collisions takes a CollisionAvoidance, not {type(collisions).__name__}"
+                )
+            collisions.bind(robot)
+        self._collisions = collisions
         self._handover: Handover | None = None
         self._loading: Loading | None = None
         self._plain = not self._robot_adds and self._integral is None
@@ -143,6 +152,7 @@ class ReferenceController:
             stack.limits,
             self._observer,
             0.0 if period is None else float(period),
+            collisions,
         )
 
     def _paced(self, period: float) -> Callable[[Task], None]:
@@ -288,6 +298,11 @@ class ReferenceController:
     def stack(self) -> Stack:
         """The stack that it was built with; tasks come and go in it, it stays."""
         return self._stack
+
+    @property
+    def collisions(self) -> CollisionAvoidance | None:
+        """What it keeps apart; obstacles come, go and move in it, it stays."""
+        return self._collisions
 
     @property
     def blending(self) -> str:

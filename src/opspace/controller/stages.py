@@ -10,6 +10,7 @@ import numpy as np
 
 from opspace.command import Found, Status
 from opspace.controller.bounds import Bounds, change_within_tick, realise
+from opspace.controller.collisions import DistanceTerms, distance_terms
 from opspace.controller.disturbance import DisturbanceObserver
 from opspace.controller.limit_task_sets import (
     LimitTerms,
@@ -38,6 +39,7 @@ from opspace.robots.protocol import Robot
 from opspace.stack import Blending, Member, Mixture, mixture, presences
 from opspace.tasks import JointLimits, PostureTask, TaskTerms, TrackingTask
 from opspace.tasks.activations import own_activation
+from opspace.tasks.collision_avoidance import CollisionAvoidance
 
 REST = ""
 """Name of the damping of what no task uses; tasks have names."""
@@ -92,6 +94,7 @@ class Rules:
         limits: Joint limits, None for none.
         observer: Of what the model does not explain; None trusts the model.
         period: Time between two ticks, in which accelerations change, s; 0 where it is not known.
+        guard: What is kept apart, None for nothing.
     """
 
     law: Law
@@ -103,6 +106,7 @@ class Rules:
     limits: JointLimits | None
     observer: DisturbanceObserver | None
     period: float
+    guard: CollisionAvoidance | None = None
 
 
 @dataclass(frozen=True)
@@ -139,6 +143,15 @@ class Blend(NamedTuple):
     corners: Sequence[Weighted]
 
 
+class Kept(NamedTuple):
+    """Torque (n,) within all bounds, N·m, what happened, and what each limit and distance takes."""
+
+    tau: np.ndarray
+    status: Status
+    acting: dict[str, float]
+    taken: np.ndarray
+
+
 class Answer(NamedTuple):
     """Torque (n,), N·m, what happened, the number of hard torques and what there is to report."""
 
@@ -165,13 +178,16 @@ def tick(k: Given) -> Answer | None:
     inserted = insert_limits(k)
     try:
         gamma, info = law(k, L, mixed, tasks, limit_corners(k, limits, inserted))
-        tau, kept, acting = keep_bounds(k, L, limits, tasks, torque(k, gamma))
+        distances = measure_distances(k)
+        kept = keep_bounds(k, L, limits, distances, tasks, torque(k, gamma))
     except (InputError, np.linalg.LinAlgError):
         # Everything that went in is finite: these numbers are too large to compute with.
         return None
+    tau, kept, acting, taken = kept
     active = {limits[i].side.name: limit for i, limit in inserted.items()} | acting
     levels = level_status(k.members, mixed, info, len(inserted))
-    found = Found(task_status(k.members, h, terms, mixed), levels, active)
+    apart = {} if distances is None else distances.layout.status(distances.distance, taken)
+    found = Found(task_status(k.members, h, terms, mixed), levels, active, apart)
     return Answer(tau, status(k, tau, info, found) | kept, info.hard_solves, found)
 
 
@@ -304,24 +320,36 @@ def torque(k: Given, gamma: np.ndarray) -> np.ndarray:
     return gamma if k.rules.bias == "task" else gamma + k.bias
 
 
+def measure_distances(k: Given) -> DistanceTerms | None:
+    """How far bodies are apart that must not touch, and how fast each distance may shrink."""
+    guard = k.rules.guard
+    return None if guard is None else distance_terms(guard, k.robot, k.t)
+
+
 def keep_bounds(
-    k: Given, L: np.ndarray, limits: Sequence[LimitTerms], tasks: Blend, tau: np.ndarray
-) -> tuple[np.ndarray, Status, dict[str, float]]:
-    """Take the nearest torque with which no joint and no motor does more than it may."""
+    k: Given,
+    L: np.ndarray,
+    limits: Sequence[LimitTerms],
+    distances: DistanceTerms | None,
+    tasks: Blend,
+    tau: np.ndarray,
+) -> Kept:
+    """Take the nearest torque with which no joint, motor or distance does more than it may."""
     rules, observer = k.rules, k.rules.observer
-    kept, acting = Status.OK, {}
+    kept, acting, taken = Status.OK, {}, np.zeros(0)
     keeps = limits if rules.limits is not None and rules.limits.law.bound else []
-    if keeps or rules.keep_torque:
+    if keeps or rules.keep_torque or distances is not None:
         room = k.torque_limit if rules.keep_torque else np.full(k.v.size, np.inf)
-        bounds, wanted = Bounds(keeps, k.M, k.bias, room), tau
-        tau, kept, acting = realise(bounds, wanted, lambda: metric(L, tasks))
+        bounds, wanted = Bounds(keeps, k.M, k.bias, room, distances), tau
+        tau, kept, acting, taken = realise(bounds, wanted, lambda: metric(L, tasks))
         acceleration = np.linalg.solve(k.M, tau - k.bias)
         if rules.period > 0.0 and k.q.size == k.v.size and bounds.near(acceleration):
             change = change_within_tick(k.robot, tau, acceleration, rules.period)
-            tau, kept, acting = realise(bounds.after(change), wanted, lambda: metric(L, tasks))
+            later = bounds.after(change)
+            tau, kept, acting, taken = realise(later, wanted, lambda: metric(L, tasks))
     if observer is not None:
         observer.remember(k.t, k.v, np.linalg.solve(k.M, tau - k.bias))
-    return tau, kept, acting
+    return Kept(tau, kept, acting, taken)
 
 
 def metric(L: np.ndarray, tasks: Blend) -> np.ndarray:

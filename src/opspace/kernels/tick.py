@@ -30,6 +30,7 @@ from opspace.kernels.columns import (
 )
 from opspace.kernels.compiled_scalars import leaning, ramp
 from opspace.kernels.corners import corners, insert, sort_corners
+from opspace.kernels.distances import measure_distances
 from opspace.kernels.dynamics import evaluate
 from opspace.kernels.inertia import (
     factor,
@@ -83,6 +84,7 @@ def tick(t, work):
             limit_stacks = limit_corners(work)
     law(work, stacks, limit_stacks)
     torque(work)
+    measure_distances(work)
     kept = keep_bounds(work, stacks)
     if not _finite(work.tau):
         return NOT_FINITE

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from opspace.command import Found, LevelStatus, TaskStatus
+from opspace.command import Distance, Found, LevelStatus, TaskStatus
 from opspace.kernels.columns import slot_bit
 from opspace.plan.entries import KERNELS
 from opspace.plan.memory import Reported
@@ -37,7 +37,12 @@ class CompiledReport:
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Be copied as what is told: the plan is of this controller, and its memory of this process."""
-        return Found, (dict(self.tasks), self.levels, dict(self.limits))
+        return Found, (
+            dict(self.tasks),
+            self.levels,
+            dict(self.limits),
+            dict(self.distances),
+        )
 
     @property
     def tasks(self) -> Mapping[str, TaskStatus]:
@@ -61,6 +66,15 @@ class CompiledReport:
             return {}
         found = self._found().numbers("limit_h")
         return {side.name: h for side, h in zip(limits.sides, found, strict=True) if h > 0.0}
+
+    @property
+    def distances(self) -> Mapping[str, Distance]:
+        """Pairs of bodies that are kept apart, by name, the nearest first."""
+        distances = self._plan.distances
+        if distances is None:
+            return {}
+        found = self._found()
+        return distances.layout.status(found["distance"], found["distance_taken"])
 
     def _task_status(self) -> dict[str, TaskStatus]:
         plan, found = self._plan, self._found()

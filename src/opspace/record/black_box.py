@@ -22,7 +22,7 @@ from opspace.record.observer import STATUS, state_columns
 from opspace.record.writer import Recorder
 from opspace.robots import Robot
 
-FAILURES = Status.FAULT | Status.LIMIT_LOST
+FAILURES = Status.FAULT | Status.LIMIT_LOST | Status.COLLISION_LOST
 """What is written down by itself; a tick that raises always is."""
 
 MOST = 20

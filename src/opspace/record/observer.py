@@ -94,6 +94,11 @@ def columns_of(
             Column(f"limits/{side.name}", "1", f"activation of the limit {side.name}")
             for side in stack.limits.sides
         ]
+    if controller.collisions is not None:
+        columns += [
+            Column("distances/least", "m", "distance of the nearest pair that is kept apart"),
+            Column("distances/taken", "m/s²", "the most that a pair slows down its approach"),
+        ]
     return [
         *columns,
         Column("hard_solves", "1", "hard torques in the blend"),
@@ -176,6 +181,10 @@ class TickRecorder:
             # Worked out anew each time it is asked for.
             limits = command.limits
             parts.append([limits.get(s.name, 0.0) for s in controller.stack.limits.sides])
+        if controller.collisions is not None:
+            apart = command.distances.values()
+            least = min((pair.distance for pair in apart), default=np.inf)
+            parts.append([least, max((pair.taken for pair in apart), default=0.0)])
         parts.append([float(command.hard_solves), float(command.status)])
         if self._truth is not None:
             parts += self._truth()

@@ -12,6 +12,7 @@ from opspace.law.scalars import LIMIT_LAWS
 from opspace.scenario.document import Document, Key, key_text
 from opspace.scenario.events import Event, ProfileName, check_events
 from opspace.scenario.fields import Checked, Entry, Number, problem, shown, whole
+from opspace.scenario.obstacle_entries import CollisionsEntry
 from opspace.scenario.targets import Configuration
 from opspace.scenario.task_entries import AnyTask
 
@@ -210,6 +211,9 @@ class Scenario(Entry):
     )
     joint_limits: JointLimitsEntry | None = Field(
         default_factory=JointLimitsEntry, description="joint limit avoidance; null is none"
+    )
+    collisions: CollisionsEntry | None = Field(
+        default=None, description="what the robot must not touch; null is nothing"
     )
     singularity: SingularityEntry | None = Field(
         default_factory=SingularityEntry, description="singularity avoidance; null is none"
