@@ -54,11 +54,16 @@ if TYPE_CHECKING:
     from opspace.sim import Plant as Plant
     from opspace.stack import Stack as Stack
     from opspace.tasks import ActivationProduct as ActivationProduct
+    from opspace.tasks import ActivationUnion as ActivationUnion
     from opspace.tasks import Chain as Chain
     from opspace.tasks import Circle as Circle
     from opspace.tasks import ComTask as ComTask
     from opspace.tasks import Constant as Constant
+    from opspace.tasks import Contact as Contact
     from opspace.tasks import DistanceBuffer as DistanceBuffer
+    from opspace.tasks import ForceTask as ForceTask
+    from opspace.tasks import GiveWay as GiveWay
+    from opspace.tasks import ImpedanceTask as ImpedanceTask
     from opspace.tasks import JerkLimited as JerkLimited
     from opspace.tasks import JointBuffer as JointBuffer
     from opspace.tasks import JointLimits as JointLimits
@@ -78,6 +83,7 @@ if TYPE_CHECKING:
     from opspace.tasks import Sample as Sample
     from opspace.tasks import Task as Task
     from opspace.tasks import TaskTerms as TaskTerms
+    from opspace.tasks import Touch as Touch
     from opspace.tasks import TrackingTask as TrackingTask
     from opspace.tasks import ViaPoints as ViaPoints
     from opspace.view import RunRequest as RunRequest
@@ -104,11 +110,11 @@ _NAMES = {
     "opspace.sim": "Plant",
     "opspace.stack": "Stack",
     "opspace.tasks": (
-        "ActivationProduct Chain Circle ComTask Constant DistanceBuffer JerkLimited JointBuffer "
-        "JointLimits JointTask MinimumJerk OrientationJerkLimited OrientationMinimumJerk "
-        "OrientationTask PoseReference PoseTask PositionTask PostureTask Reference "
-        "RelativeOrientationTask RelativePoseTask RelativePositionTask Sample Task TaskTerms "
-        "TrackingTask ViaPoints"
+        "ActivationProduct ActivationUnion Chain Circle ComTask Constant Contact DistanceBuffer "
+        "ForceTask GiveWay ImpedanceTask JerkLimited JointBuffer JointLimits JointTask MinimumJerk "
+        "OrientationJerkLimited OrientationMinimumJerk OrientationTask PoseReference PoseTask "
+        "PositionTask PostureTask Reference RelativeOrientationTask RelativePoseTask "
+        "RelativePositionTask Sample Task TaskTerms Touch TrackingTask ViaPoints"
     ),
     "opspace.view": "RunRequest Viewer",
 }

@@ -36,6 +36,8 @@ class Status(IntFlag):
     joint came too fast to be stopped at its limit."""
     HANDOVER = 1024
     """The torque is on its way from or to another controller's."""
+    WRENCH_STALE = 2048
+    """A wrench that a task needs has not been measured lately; the task presses on without it."""
     FAULT = 8
     """No finite torque was found; the command is bias compensation with damping."""
 

@@ -27,12 +27,15 @@ class TaskTerms:
         drift: (m,) J̇ v, task acceleration at zero joint acceleration.
         acceleration: (m,) commanded acceleration f* of Eq. 24.
         error: (m,) x_d − x; of an orientation the rotation vector from R to R_d.
+        torque: (n,) balanced torque g, N·m, given beside the rows and scaled with the task's
+            activation: what the world answers it with is no disturbance of any task. None is none.
     """
 
     J: Array
     drift: Array
     acceleration: Array
     error: Array
+    torque: Array | None = None
 
 
 class LastChange:
