@@ -52,6 +52,7 @@ if TYPE_CHECKING:
     from opspace.robots import available_robots as available_robots
     from opspace.robots import load_robot as load_robot
     from opspace.sim import Plant as Plant
+    from opspace.sim import Surface as Surface
     from opspace.stack import Stack as Stack
     from opspace.tasks import ActivationProduct as ActivationProduct
     from opspace.tasks import ActivationUnion as ActivationUnion
@@ -107,7 +108,7 @@ _NAMES = {
     "opspace.loop": "AnyPlant Observer Outcome Stepping StopRule simulate",
     "opspace.plan.calibration": "Calibration",
     "opspace.plan.scales": "Singularity",
-    "opspace.sim": "Plant",
+    "opspace.sim": "Plant Surface",
     "opspace.stack": "Stack",
     "opspace.tasks": (
         "ActivationProduct ActivationUnion Chain Circle ComTask Constant Contact DistanceBuffer "

@@ -227,6 +227,11 @@ class ForceTask(Task):
         return self._tool if self.source.frame is None else self.source.frame
 
     @property
+    def error_units(self) -> tuple[str, ...]:
+        """Unit of each row of the error, which is the missing force or moment."""
+        return ("N",) * self.forces + ("N·m",) * (self.rows - self.forces)
+
+    @property
     def touch(self) -> Touch | None:
         """What it knew of its contact in the last tick; None before the first."""
         return None if self._memory is None else self._memory.touch

@@ -133,6 +133,11 @@ class Task(KnownAttributes, ABC):
         del pause
         self.reset()
 
+    @property
+    def error_units(self) -> tuple[str, ...]:
+        """Unit of each row of the error that a tick reports."""
+        return self.units
+
     def row_axes(self, robot: Robot) -> Array | None:
         """Return the motion in world axes that each row is about, to be drawn.
 
