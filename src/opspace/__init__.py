@@ -49,6 +49,7 @@ if TYPE_CHECKING:
     from opspace.robots import Payload as Payload
     from opspace.robots import Robot as Robot
     from opspace.robots import RobotInfo as RobotInfo
+    from opspace.robots import WristSensor as WristSensor
     from opspace.robots import available_robots as available_robots
     from opspace.robots import load_robot as load_robot
     from opspace.sim import Plant as Plant
@@ -104,7 +105,7 @@ _NAMES = {
     "opspace.record.black_box": "BlackBox",
     "opspace.record.observer": "TickRecorder",
     "opspace.record.replay": "Replay replay",
-    "opspace.robots": "Payload Robot RobotInfo available_robots load_robot",
+    "opspace.robots": "Payload Robot RobotInfo WristSensor available_robots load_robot",
     "opspace.loop": "AnyPlant Observer Outcome Stepping StopRule simulate",
     "opspace.plan.calibration": "Calibration",
     "opspace.plan.scales": "Singularity",
