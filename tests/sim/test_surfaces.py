@@ -40,6 +40,23 @@ def test_a_button_is_soft_first_and_an_edge_ends():
     assert not button.force(np.array([0.03, 0.0, -0.003]), still).any()
 
 
+@given(number(-0.02, 0.02), number(0.0, 0.13), number(0.0, 6.3))
+def test_a_rim_takes_no_energy_and_gives_none(depth, radius, angle):
+    """The force is the gradient of what the spring holds, on the flat and on the rim."""
+    surface = osc.Surface([0, 0, 0], stiffness=1e3, friction=0.0, size=0.1, bevel=0.02)
+    x = np.array([radius * np.cos(angle), radius * np.sin(angle), -depth])
+
+    def energy(at):
+        past = max(np.hypot(at[0], at[1]) - 0.1, 0.0)
+        sunk = max(-at[2] - past**2 / 0.04, 0.0)
+        return 0.5 * 1e3 * sunk**2 * (past <= 0.02)
+
+    h = 1e-6
+    slope = [(energy(x - h * e) - energy(x + h * e)) / (2.0 * h) for e in np.eye(3)]
+    if abs(radius - 0.12) > 2e-6:
+        np.testing.assert_allclose(surface.force(x, np.zeros(3)), slope, atol=2e-3)
+
+
 @pytest.mark.parametrize(
     "options",
     [{"point": [0.0]}, {"normal": [0, 0, 0]}, {"stiffness": 0.0}, {"friction": -1.0}, {"size": 0}],
@@ -114,3 +131,16 @@ def test_wiping_keeps_the_force(stiffness):
 @pytest.mark.slow
 def test_a_soft_touch_is_softer():
     assert touch_and_wipe("contact", robot=ARM, stiffness=1e3, seconds=2.6).step <= 0.7
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("stiffness", [1e4, 1e5])
+def test_a_circle_over_the_edge_finds_the_table_again(stiffness):
+    run = touch_and_wipe(
+        "distance", robot=ARM, stiffness=stiffness, seconds=7.5, size=0.12, table=0.05
+    )
+    wiping = slice(round(3.0 / DT), None)
+    assert run.losses >= 1
+    assert run.force[-1] == pytest.approx(10.0, abs=0.5)
+    assert np.max(np.abs(np.diff(run.tau[wiping], axis=0))) <= 1.2
+    assert run.force[wiping].max() <= 40.0

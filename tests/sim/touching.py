@@ -101,7 +101,7 @@ def down_and_around(start, speed, travel=0.2):
 
 def touch_and_wipe(
     way, *, stiffness=1e5, speed=0.1, seconds=AFTER, robot="puma560", approach=0.04, table=0.08,
-    plant=ROUGH, expected=0.0,
+    plant=ROUGH, size=math.inf,
 ) -> Touched:  # fmt: skip
     """Run one way of coming into contact.
 
@@ -114,7 +114,7 @@ def touch_and_wipe(
         approach: Speed of the force task in the air, m/s.
         table: How far below the start it is, m.
         plant: What is wrong with the plant.
-        expected: How much higher than in truth the table is told to be, m.
+        size: Radius of the table around the start, m; its rim falls away over 15 mm.
     """
     arm = osc.load_robot(robot)
     arm.update(arm.q_reference, np.zeros(arm.nv))
@@ -127,14 +127,14 @@ def touch_and_wipe(
     if way == "contact":
         press.activation = osc.Contact(press)
     elif way == "distance":
-        press.activation = osc.ActivationUnion(osc.Contact(press), Height(height + expected))
+        press.activation = osc.ActivationUnion(osc.Contact(press), Height(height))
     elif way == "hard":
         press.activation = HardContact(press)
     hand = osc.PositionTask(target=osc.GiveWay(down_and_around(start, speed), press), kp=400.0)
     turn = osc.OrientationTask(target=upright, kp=400.0)
     stack = osc.Stack([press, turn, hand, osc.PostureTask(arm.q_reference, kp=20.0)])
     controller = osc.Controller(arm, stack, period=DT)
-    surface = osc.Surface([0.0, 0.0, height], stiffness=stiffness)
+    surface = osc.Surface([*start[:2], height], stiffness=stiffness, size=size, bevel=0.015)
     world = osc.Plant(arm, arm.q_reference, surfaces=[surface], disturbances=plant)
     rows = []
     for i in range(round(seconds / DT)):

@@ -33,7 +33,8 @@ class Surface:
         stiffness: k, N/m.
         friction: μ.
         damping: b, N·s/m.
-        size: Radius in which it is there, m; inf is everywhere.
+        size: Radius in which it is flat, m; inf is everywhere.
+        bevel: Width of the rim beyond, which falls away down to 45° and ends there, m.
         give: How far it is soft, m.
         soft_stiffness: Its stiffness as far as that, N/m.
     """
@@ -44,6 +45,7 @@ class Surface:
     friction: float = 0.3
     damping: float = 0.0
     size: float = math.inf
+    bevel: float = 0.0
     give: float = 0.0
     soft_stiffness: float = 1000.0
 
@@ -57,7 +59,7 @@ class Surface:
         for name in ("stiffness", "soft_stiffness", "size"):
             if not getattr(self, name) > 0.0:
                 raise InputError(f"{name} of a surface must be above 0, got {getattr(self, name)}")
-        for name in ("friction", "damping", "give"):
+        for name in ("friction", "damping", "give", "bevel"):
             if not (math.isfinite(getattr(self, name)) and getattr(self, name) >= 0.0):
                 raise InputError(
                     f"{name} of a surface must be finite and >= 0, got {getattr(self, name)}"
@@ -75,16 +77,24 @@ class Surface:
         """
         n = np.asarray(self.normal, dtype=float) / np.linalg.norm(self.normal)
         away = x - np.asarray(self.point, dtype=float)
-        depth = -float(n @ away)
-        if depth <= 0.0 or np.linalg.norm(away + depth * n) > self.size:
+        below = -float(n @ away)
+        outwards = away + below * n
+        radius = float(np.linalg.norm(outwards))
+        past = max(radius - self.size, 0.0)
+        if below <= 0.0 or past > self.bevel:
             return np.zeros(3)
+        # The rim falls by past²/(2 bevel): its slope is the gradient of the depth.
+        slope = past / self.bevel if past > 0.0 else 0.0
+        depth = below - 0.5 * slope * past
+        if depth <= 0.0:
+            return np.zeros(3)
+        up = n + slope * outwards / radius if slope > 0.0 else n
         soft = min(depth, self.give)
         spring = self.soft_stiffness * soft + self.stiffness * (depth - soft)
-        normal = max(spring - self.damping * float(n @ v), 0.0)
-        along = v - (n @ v) * n
-        return normal * (
-            n - self.friction * along / math.hypot(float(np.linalg.norm(along)), CREEP)
-        )
+        normal = max(spring - self.damping * float(up @ v), 0.0)
+        along = v - (up @ v) / (up @ up) * up
+        rubbing = self.friction * np.linalg.norm(up) / math.hypot(np.linalg.norm(along), CREEP)
+        return normal * (up - rubbing * along)
 
 
 class TouchedWorld:
