@@ -47,7 +47,16 @@ from opspace.stack import Blending, Member, Outlook, variables_of
 from opspace.tasks.task import CHANGES
 from opspace.tasks.validation import finite, numbers
 
-STATUSES = tuple(map(Status, range(SOLVE)))
+
+class _Statuses(dict[int, Status]):
+    """Flags by their number; making one costs more than a tick, making all of them a second."""
+
+    def __missing__(self, bits: int) -> Status:
+        found = self[bits] = Status(bits)
+        return found
+
+
+STATUSES = _Statuses()
 NEW = tuple.__new__
 KEPT = 32
 """Plans that are kept for stacks to come again."""
