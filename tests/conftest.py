@@ -11,7 +11,7 @@ READABLE = (
     "blending",
     "hierarchy",
     "recursion",
-    "singularity",
+    "singular_directions",
     "tasksets",
     "torque",
     "tree",

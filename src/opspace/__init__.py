@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from opspace.errors import RecordingError as RecordingError
     from opspace.errors import ScenarioError as ScenarioError
     from opspace.errors import UnknownNameError as UnknownNameError
+    from opspace.export.c_library import export_c as export_c
     from opspace.law import Activation as Activation
     from opspace.law import Buffer as Buffer
     from opspace.law import LawInfo as LawInfo
@@ -98,6 +99,7 @@ _NAMES = {
         "InputError MissingExtraError ModelError ModelWarning OpspaceError RecordingError ScenarioError "
         "UnknownNameError"
     ),
+    "opspace.export.c_library": "export_c",
     "opspace.law": (
         "Activation Buffer LawInfo Profile Ramp SigmaBuffer TaskSet intermediate_values task_torque"
     ),

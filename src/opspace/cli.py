@@ -589,6 +589,33 @@ def export(
     print(f"results: {path}")
 
 
+@app.command("export-c", epilog="Example: opspace export-c my.yaml --out arm --absent guest")
+def export_as_c(
+    scenario: Annotated[str, typer.Argument(help="Name of a scenario, or path of a .yaml file.")],
+    out: Annotated[Path, typer.Option(help="Directory to write to.")],
+    name: Annotated[str, typer.Option(help="Name of the model in C.")] = "controller",
+    absent: Annotated[
+        list[str] | None,
+        typer.Option(metavar="TASK", help="Task that is not there at first; repeatable."),
+    ] = None,
+    overrides: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="KEY=VALUE", help="Change one value; repeatable."),
+    ] = None,
+    overwrite: Annotated[
+        bool, typer.Option("--overwrite", help="Replace files that are already there.")
+    ] = False,
+) -> None:
+    """Write the controller of a scenario as a C library, for programs without Python."""
+    from opspace.export.c_library import export_c
+    from opspace.scenario import load_scenario
+    from opspace.scenario.build import build
+
+    controller = build(load_scenario(scenario, overrides or ())).controller
+    export_c(controller, out, name, absent=absent or (), overwrite=overwrite)
+    print(f"results: {out}")
+
+
 @app.command(epilog="Example: opspace plot results/a results/b tau tool/x --overlay")
 def plot(
     words: Annotated[

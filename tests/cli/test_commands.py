@@ -31,6 +31,28 @@ def refused(capsys, *words):
     return err
 
 
+# -- export-c --------------------------------------------------------------------------------------
+
+HOLD = """
+robot: puma560
+start: home
+duration: 1.0
+tasks:
+  orientation: {type: orientation, level: 0, target: [1.0, 0.0, 0.0, 0.0]}
+  posture: {type: posture, level: 1, target: home}
+"""
+
+
+def test_export_c_writes_a_library(capsys, tmp_path):
+    (tmp_path / "hold.yaml").write_text(HOLD)
+    words = ["export-c", str(tmp_path / "hold.yaml"), "--out", str(tmp_path / "arm")]
+    status, printed, err = run(capsys, *words, "--name", "arm", "--absent", "posture")
+    assert (status, err) == (0, "")
+    assert printed == f"results: {tmp_path / 'arm'}\n"
+    assert "ARM_TASK_posture = 1" in (tmp_path / "arm" / "arm.h").read_text()
+    assert "hnad" in refused(capsys, *words, "--absent", "hnad", "--overwrite")
+
+
 # -- run -------------------------------------------------------------------------------------------
 
 

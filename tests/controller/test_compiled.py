@@ -375,7 +375,7 @@ def test_a_rotation_past_half_a_turn_keeps_its_way():
 def test_no_angle_makes_a_step(robot, max_speed):
     """Two turns of the first joint away from the target: ten times finer, steps of a tenth."""
     largest = []
-    for ticks in (400, 4000):
+    for ticks in (200, 2000):
         twins = Twins(robot, lambda: [OrientationTask(kp=50.0, max_speed=max_speed)])
         q, v = twins.robot.q_reference.copy(), np.zeros(6)
         path = []

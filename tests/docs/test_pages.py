@@ -106,8 +106,8 @@ def test_the_programs_are_found():
     found = {name_of(page) for page in WITH_PROGRAMS}
     assert {"README.md", "docs/theory.md", "docs/tutorial.md", "docs/how-to/mujoco.md"} <= found
     unknown = {block.language for page in PAGES for block in blocks_of(page)}
-    # Patches are applied and used by test_worked_examples.
-    assert unknown <= {"python", "sh", "yaml", "xml", "text", "diff"}
+    # Patches are applied and used by test_worked_examples, C is compiled by export/test_c_library.
+    assert unknown <= {"python", "sh", "yaml", "xml", "text", "diff", "c"}
 
 
 def parse_opspace(words):
@@ -133,6 +133,8 @@ def check_command(line):
         assert asked, line
         extras = metadata.metadata("opspace").get_all("Provides-Extra", [])
         assert set((asked[1] or "all").split(",")) <= set(extras), line
+    elif words[0] == "cc":  # run by export/test_c_library
+        assert words[-1] == "hold", line
     elif words[0] == "python":
         assert (ROOT / words[1]).is_file(), line
     else:

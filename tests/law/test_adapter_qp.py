@@ -77,7 +77,7 @@ CONTROLLERS = {
 }
 
 
-@examples(60)
+@examples(30)
 @given(st.integers(0, 2**32 - 1), st.sampled_from(sorted(CONTROLLERS)))
 def test_a_hard_switched_qp_becomes_continuous(seed, kind):
     rng = np.random.default_rng(seed)

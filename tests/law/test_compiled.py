@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from opspace.kernels.algebra import cholesky, singular_values
@@ -16,6 +16,7 @@ from opspace.law.activation import PROFILES, Profile, Ramp
 from opspace.law.hierarchy import whiten
 from opspace.plan.memory import Sizes, make_inertia
 from opspace.plan.records import SPACE
+from tests.budget import examples
 
 
 def random_stack(rng):
@@ -70,7 +71,7 @@ def compiled_torque(L, tasks, blend, buffer):
     return L @ u
 
 
-@settings(max_examples=400)
+@examples(150)
 @given(
     seed=st.integers(0, 2**32 - 1),
     smooth=st.booleans(),

@@ -9,8 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from opspace.machine import kept_object
+from opspace.machine import kept_object, processor
+from opspace.machine.processor import SHIPPED, host
 from opspace.machine.sources import stamp
+from opspace.plan import entries
 from opspace.plan.entries import ENTRIES
 from opspace.record import load
 
@@ -124,6 +126,76 @@ def test_what_the_other_process_says_is_of_no_importance(empty, tmp_path):
 def test_without_another_process_it_compiles_by_itself(empty, python):
     assert empty("-c", START.format(python=python)).stdout.split() == COMPILED_HERE
     assert empty("-c", START.format(python=python)).stdout.split() == LOADED
+
+
+MAKE_TO_SHIP = """
+import pathlib, sys
+import small
+place = pathlib.Path(sys.argv[1], "machine", "objects")
+place.mkdir(parents=True)
+for name, content in small.LIBRARY.to_ship().items():
+    (place / name).write_bytes(content)
+"""
+USE_SHIPPED = """
+import pathlib, sys
+from opspace.machine import kept_object
+kept_object.PACKAGE = pathlib.Path(sys.argv[1])
+{program}
+assert small.LIBRARY.came == "shipped"
+"""
+ELF_MACHINES = {"x86_64": 62, "aarch64": 183}
+
+
+def test_what_is_shipped_is_loaded_and_nothing_is_compiled_or_kept(empty, tmp_path):
+    empty("-c", MAKE_TO_SHIP, str(tmp_path))
+    files = objects(tmp_path)
+    assert len(files) == len(SHIPPED)
+    for path in files:
+        content = path.read_bytes()[kept_object.SUM :]
+        set_ = path.name.split("-")[1]
+        assert content[:4] == b"\x7fELF"
+        assert int.from_bytes(content[18:20], "little") == ELF_MACHINES[set_]
+    if host() not in SHIPPED:
+        pytest.skip(f"nothing is shipped for {host().triple}, {host().cpu}")
+    done = empty("-c", USE_SHIPPED.format(program=PROGRAM), str(tmp_path))
+    assert done.stdout.split() == LOADED
+    assert not done.stderr
+    assert not (tmp_path / "kept").exists()
+
+
+def test_a_damaged_object_of_the_package_is_not_loaded(monkeypatch, tmp_path):
+    monkeypatch.setattr(kept_object, "PACKAGE", tmp_path)
+    place = tmp_path / "machine" / "objects"
+    place.mkdir(parents=True)
+    assert kept_object.read_shipped("one.o") is None
+    (place / "one.o").write_bytes(kept_object.sealed(b"content"))
+    assert kept_object.read_shipped("one.o") == b"content"
+    (place / "one.o").write_bytes(kept_object.sealed(b"content")[:-1])
+    assert kept_object.read_shipped("one.o") is None
+
+
+LINUX, MAC = "x86_64-pc-linux-gnu", "arm64-apple-darwin24.6.0"
+OLD, NEW = ("+" + ",+".join(sorted(able)) for able in (processor.V2, processor.V2 | processor.V3))
+
+
+@pytest.mark.parametrize(
+    ("triple", "features", "expected"),
+    [
+        (LINUX, NEW + ",+avx512f", "x86-64-v3"),
+        (LINUX, NEW.replace("+avx2", "-avx2"), "x86-64-v2"),
+        (LINUX, OLD, "x86-64-v2"),
+        (LINUX, "", "own"),
+        ("x86_64-apple-darwin23.1.0", NEW, "own"),
+        (MAC, "+neon", "own"),
+        ("aarch64-unknown-linux-gnu", "+neon,+sve", "generic"),
+        ("aarch64_be-unknown-linux-gnu", "+neon", "own"),
+    ],
+)
+def test_a_machine_runs_the_best_object_that_it_can(monkeypatch, triple, features, expected):
+    own = processor.Processor(triple, "own", features)
+    monkeypatch.setattr(processor, "exactly", lambda: own)
+    assert host().cpu == expected
+    assert (host() in SHIPPED) == (expected != "own")
 
 
 def test_a_kernel_that_asks_for_what_nobody_has_is_refused_by_name(empty, tmp_path):
@@ -281,10 +353,18 @@ def trapped(builder, index, size):
 
 translate_only()
 slicing.fix_index = trapped
-from opspace.machine.compile_object import compile_object
+from opspace.machine.compile_object import compile_objects
 from opspace.plan.entries import ENTRIES, KERNELS
-assert kept_object.keep(KERNELS.file_name(host()), compile_object(ENTRIES, host()))
+assert kept_object.keep(KERNELS.file_name(host()), *compile_objects(ENTRIES, [host()]))
 """
+
+
+def test_the_object_carries_its_stamp_and_no_path_of_who_made_it():
+    """Python's own errors would bring it, with the file that they come from."""
+    content = entries.KERNELS.object()
+    assert entries.KERNELS.stamp.encode() in content
+    assert b"builtins" not in content
+    assert b".py" not in content
 
 
 @pytest.mark.slow

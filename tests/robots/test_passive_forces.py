@@ -53,6 +53,19 @@ pytestmark = pytest.mark.filterwarnings("ignore:arm. the motors of turn carry we
 
 
 @pytest.mark.parametrize("backend", BACKENDS)
+def test_the_compiled_tick_leaves_to_a_robot_what_gravity_is_there(arm, backend):
+    robot = load_robot(arm, backend=backend)
+    controller = osc.Controller(robot, osc.Stack([osc.PostureTask()]), gravity="robot")
+    rng = np.random.default_rng(4)
+    for k in range(3):
+        q, v = rng.uniform(-1, 1, (2, 3))
+        controller.step(1e-3 * k, q, v)
+        robot.update(q, v)
+        assert controller._laid_out is not None, "the tick should be compiled"
+        np.testing.assert_allclose(controller._added_by_robot(), robot.gravity, atol=1e-10)
+
+
+@pytest.mark.parametrize("backend", BACKENDS)
 def test_the_bias_is_what_mujoco_needs(arm, backend):
     robot = load_robot(arm, backend=backend)
     model = mujoco.MjModel.from_xml_path(str(arm))

@@ -15,6 +15,7 @@ from opspace.plots.plot_columns import plot_columns
 from opspace.record.format import DATA, END, HEADER, META
 from opspace.runs.replay_run import replay
 from opspace.scenario.build import build
+from tests.budget import examples
 from tests.scenario.short import short
 from tests.scenario.test_fuzz import ODD, damaged, mutated, named
 
@@ -132,7 +133,7 @@ def box(tmp_path_factory):
 
 
 @given(seed=SEEDS)
-@settings(max_examples=50)
+@examples(20)
 def test_a_damaged_recording_is_one_or_is_refused(box, tmp_path_factory, seed):
     rng = random.Random(seed)
     path = tmp_path_factory.mktemp("fuzz") / "recording"

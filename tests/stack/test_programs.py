@@ -6,6 +6,7 @@ from hypothesis import given, settings
 
 from opspace.law import TaskSet, Weighted, blended_torque
 from opspace.stack import Blending, Stack, mixture
+from tests.budget import examples
 from tests.stack.arm import arm, state, tasks_for
 from tests.stack.programs import Program, programs, running_of, variables_of
 
@@ -126,7 +127,7 @@ def test_a_step_is_at_most_what_the_activations_allow(bench, blending, steps):
 
 
 @pytest.mark.parametrize("blending", ["idv", "chain"])
-@settings(max_examples=5)
+@examples(3)
 @given(steps=programs(0.15, 0.5))
 def test_halving_the_tick_halves_the_largest_step(bench, blending, steps):
     # At half a millisecond: where several ramps are steep at once, longer ticks step over the

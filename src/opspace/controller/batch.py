@@ -203,8 +203,7 @@ def check_members(members: tuple[Member, ...]) -> None:
         InputError: A task is the user's own, or holds what it finds and has found nothing yet;
             or there are too many.
     """
-    if not Plan.fits(members):
-        raise InputError(f"{len(members)} tasks are more than a batch can take; some thirty fit")
+    check_count(members, "a batch")
     for member in members:
         task = member.task
         if kind_of(task) == OWN:
@@ -217,6 +216,16 @@ def check_members(members: tuple[Member, ...]) -> None:
                 f"task {task.name!r} will hold what it finds at its first tick: give it a target, "
                 "or call step before"
             )
+
+
+def check_count(members: tuple[Member, ...], who: str) -> None:
+    """Check that compiled code can take so many tasks.
+
+    Raises:
+        InputError: It cannot.
+    """
+    if not Plan.fits(members):
+        raise InputError(f"{len(members)} tasks are more than {who} can take; some thirty fit")
 
 
 def _remembered(plan: Plan) -> Record:

@@ -80,8 +80,8 @@ class Controller(ReferenceController):
     """Operational space control of a stack of tasks on a robot.
 
     Every tick is one call of compiled code, which computes what `ReferenceController` computes; the
-    arguments, errors and results are the same. The first controller on a machine compiles it, which
-    takes about half a minute; later ones read it from the disk.
+    arguments, errors and results are the same. A wheel brings it compiled; elsewhere the first
+    controller compiles it, which takes about half a minute, and later ones read it from the disk.
 
     Options are fixed when it is built. Robots with joints of several coordinates, and stacks of more
     than some thirty tasks, take the readable form.
@@ -154,6 +154,13 @@ class Controller(ReferenceController):
             Command, (t, torque(), status, answer // SOLVE, CompiledReport(plan, memory()))
         )
         return command if self._plain else self._finished(command, members)
+
+    def _added_by_robot(self) -> np.ndarray:
+        if not self._robot_adds or self._bodies is None or self._laid_out is None:
+            return super()._added_by_robot()
+        _, plan, address, *_ = self._laid_out
+        KERNELS["gravity"](address)
+        return np.nan_to_num(plan.tick.gravity, nan=0.0, posinf=0.0, neginf=0.0)
 
     def _begin_anew(self) -> None:
         super()._begin_anew()

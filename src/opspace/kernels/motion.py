@@ -104,10 +104,10 @@ def _jacobian(work, m, joint, x):
     px, py, pz = x[P], x[P + 1], x[P + 2]
     j = joint
     while j >= 0:
-        lx, ly, lz, wx, wy, wz = work.axes[j]
-        J[0, j] = lx + wy * pz - wz * py
-        J[1, j] = ly + wz * px - wx * pz
-        J[2, j] = lz + wx * py - wy * px
+        wx, wy, wz = work.axes[j, 3], work.axes[j, 4], work.axes[j, 5]
+        J[0, j] = work.axes[j, 0] + wy * pz - wz * py
+        J[1, j] = work.axes[j, 1] + wz * px - wx * pz
+        J[2, j] = work.axes[j, 2] + wx * py - wy * px
         J[3, j] = wx
         J[4, j] = wy
         J[5, j] = wz

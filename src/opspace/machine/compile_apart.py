@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import logging
 import os
+import pickle
 import subprocess
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 
 from opspace.machine.processor import Processor
@@ -13,36 +15,36 @@ from opspace.machine.processor import Processor
 log = logging.getLogger("opspace")
 
 PROGRAM = """
-import os, sys
+import os, pickle, sys
 answer = os.dup(1)
 os.dup2(2, 1)  # whatever is printed on the way is no part of the object
 sys.path[:] = {path!r}
 from opspace.machine.translate import translate_only
 translate_only()
 from {module} import ENTRIES
-from opspace.machine.compile_object import compile_object
+from opspace.machine.compile_object import compile_objects
 from opspace.machine.processor import Processor
 with os.fdopen(answer, "wb") as answer:
-    answer.write(compile_object(ENTRIES, Processor{processor!r}))
+    pickle.dump(compile_objects(ENTRIES, [Processor(*one) for one in {processors!r}]), answer)
 """
 
 
-def compile_apart(module: str, processor: Processor) -> bytes | None:
+def compile_apart(module: str, processors: Sequence[Processor]) -> list[bytes] | None:
     """Have another process compile, and wait for it.
 
     Args:
         module: Module with the ``ENTRIES``.
-        processor: What for.
+        processors: What for.
 
     Returns:
-        The object, None where no other process can be started.
+        The object for each, None where no other process can be started.
     """
     # An application with Python inside would be started a second time.
     own = Path(sys.executable or "").stem.lower().startswith("python")
     if not own or getattr(sys, "frozen", False):
         return None
     path = [entry for entry in sys.path if type(entry) is str]
-    program = PROGRAM.format(path=path, module=module, processor=tuple(processor))
+    program = PROGRAM.format(path=path, module=module, processors=[*map(tuple, processors)])
     # How a user has numba treat functions of the user's own is nothing to kernels.
     environment = {k: x for k, x in os.environ.items() if not k.startswith("NUMBA_")}
     try:
@@ -58,5 +60,5 @@ def compile_apart(module: str, processor: Processor) -> bytes | None:
     except subprocess.CalledProcessError as error:
         log.debug("compiling in another process failed:\n%s", error.stderr.decode(errors="replace"))
     else:
-        return done.stdout
+        return pickle.loads(done.stdout)
     return None

@@ -1,4 +1,4 @@
-"""Compile kernels into one object with a C interface, optimised once as a whole."""
+"""Compile kernels into objects with a C interface, each optimised once as a whole."""
 
 # numba's own modules have no type stubs.
 # pyright: reportUnknownMemberType=false
@@ -13,12 +13,13 @@ from typing import Any
 from llvmlite import binding as llvm
 from llvmlite import ir
 from numba import types
+from numba.core import cgutils
 from numba.core import config as settings
 from numba.core.compiler_lock import global_compiler_lock
 
 from opspace.machine.field_table import RecordTable
 from opspace.machine.handle_type import handle_type
-from opspace.machine.kernel_entry import Argument, KernelEntry
+from opspace.machine.kernel_entry import Argument, KernelEntry, stamp_of
 from opspace.machine.processor import Processor
 
 LIBRARY = {
@@ -27,10 +28,13 @@ LIBRARY = {
 }
 """What the object may ask of the process that loads it: C's own library, nothing of Python's."""
 
+STAMP = "opspace_stamp"
+"""Symbol of the text that says what the object was made of; who links it compares."""
+
 NUMBERS = {float: types.float64, int: types.int64}
 
 
-def compile_object(entries: Sequence[KernelEntry], processor: Processor) -> bytes:
+def compile_objects(entries: Sequence[KernelEntry], processors: Sequence[Processor]) -> list[bytes]:
     """Compile entries and everything that they call.
 
     Numba only translates. LLVM optimises once, when all is in one piece: done function by function,
@@ -39,20 +43,26 @@ def compile_object(entries: Sequence[KernelEntry], processor: Processor) -> byte
 
     Args:
         entries: The functions.
-        processor: What for.
+        processors: What for; none of them need be the one that this is run on.
 
     Returns:
-        The object file.
+        The object file for each.
 
     Raises:
         ImportError: A kernel asks for something that is neither here nor in C's library.
     """
     with _translated_only(), global_compiler_lock:
         text = _translation(entries)
+    llvm.initialize_all_targets()
+    llvm.initialize_all_asmprinters()
+    return [_compiled(text, entries, processor) for processor in processors]
+
+
+def _compiled(text: str, entries: Sequence[KernelEntry], processor: Processor) -> bytes:
     module = llvm.parse_assembly(text)
     machine = processor.machine()
     module.triple, module.data_layout = processor.triple, str(machine.target_data)
-    seen = {entry.symbol for entry in entries}
+    seen = {STAMP, *(entry.symbol for entry in entries)}
     parts = [*module.functions, *module.global_variables]
     for number, part in enumerate(parts):
         if not part.is_declaration and part.name not in seen:
@@ -89,6 +99,8 @@ def _translation(entries: Sequence[KernelEntry]) -> str:
         compiled = kernel.overloads[signature]
         library.add_linking_library(compiled.library)
         _define(entry, compiled.fndesc, context, module)
+    said = cgutils.make_bytearray(stamp_of(entries).encode() + bytes(1))
+    cgutils.global_constant(module, STAMP, said, linkage="")
     library.add_ir_module(module)
     library.finalize()
     return library.get_llvm_str()

@@ -1,4 +1,4 @@
-"""Compiled kernels that are kept on the disk for the next start, wherever a place can be found."""
+"""Compiled kernels on the disk: those that came with the package, those kept for the next start."""
 
 from __future__ import annotations
 
@@ -43,14 +43,27 @@ def _user_cache() -> Path:
 
 def read(name: str) -> bytes | None:
     """Return an object that is kept, None if there is none or it is damaged."""
-    for place in places():
-        try:
-            content = (place / name).read_bytes()
-        except OSError:
-            continue
-        if hashlib.sha256(content[SUM:]).digest() == content[:SUM]:
-            return content[SUM:]
-        log.debug("%s is damaged", place / name)
+    return next(filter(None, (_whole(place / name) for place in places())), None)
+
+
+def read_shipped(name: str) -> bytes | None:
+    """Return an object that came with the package, None if none did or it is damaged."""
+    return _whole(PACKAGE / "machine" / "objects" / name)
+
+
+def sealed(content: bytes) -> bytes:
+    """Return an object with the checksum that a reader expects before it."""
+    return hashlib.sha256(content).digest() + content
+
+
+def _whole(path: Path) -> bytes | None:
+    try:
+        found = path.read_bytes()
+    except OSError:
+        return None
+    if found == sealed(found[SUM:]):
+        return found[SUM:]
+    log.debug("%s is damaged", path)
     return None
 
 
@@ -79,7 +92,7 @@ def keep(name: str, content: bytes) -> bool:
         descriptor, path = tempfile.mkstemp(dir=place)
         try:
             with os.fdopen(descriptor, "wb") as file:
-                file.write(hashlib.sha256(content).digest() + content)
+                file.write(sealed(content))
             os.chmod(path, 0o644)  # others may start from it
             os.replace(path, place / name)
         except OSError:

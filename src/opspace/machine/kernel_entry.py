@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import ctypes
+from collections.abc import Sequence
 from typing import Any, NamedTuple, TypeAlias
 
 from opspace.machine.field_table import RecordTable
+from opspace.machine.sources import stamp
 
 Argument: TypeAlias = type[float] | type[int] | RecordTable
 
@@ -46,3 +48,8 @@ class KernelEntry(NamedTuple):
         """Everything that the compiled function takes for granted of its arguments."""
         taken = (one.layout if isinstance(one, RecordTable) else one.__name__ for one in self.takes)
         return f"{self.module}.{self.name}({', '.join(taken)})"
+
+
+def stamp_of(entries: Sequence[KernelEntry]) -> str:
+    """Return what changes with everything that is frozen into the code of these functions."""
+    return stamp("\n".join(entry.layout for entry in entries))[:32]

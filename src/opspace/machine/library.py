@@ -1,4 +1,4 @@
-"""Compiled functions that Python calls: found on the disk or compiled once, then loaded."""
+"""Compiled functions that Python calls: shipped, found on the disk or compiled once, then loaded."""
 
 from __future__ import annotations
 
@@ -6,16 +6,16 @@ import logging
 import threading
 import time
 from collections.abc import Sequence
+from functools import cached_property
 from typing import Any
 
 from llvmlite import binding as llvm
 
 from opspace.machine.compile_apart import compile_apart
-from opspace.machine.kept_object import keep, read, writable
-from opspace.machine.kernel_entry import KernelEntry
-from opspace.machine.processor import Processor, host
+from opspace.machine.kept_object import keep, read, read_shipped, sealed, writable
+from opspace.machine.kernel_entry import KernelEntry, stamp_of
+from opspace.machine.processor import SHIPPED, Processor, host
 from opspace.machine.python_call import PythonCalls
-from opspace.machine.sources import stamp
 
 log = logging.getLogger("opspace")
 
@@ -26,10 +26,16 @@ ESTIMATE = "about half a minute, on a busy machine several"
 class Library:
     """Compiled functions in one object, which every process loads as it is.
 
+    Attributes:
+        came: Where the object came from, ``"shipped"``, ``"kept"`` or ``"compiled"``; empty before
+            it is loaded.
+
     Args:
         module: Module that has them as ``ENTRIES``.
         entries: The functions.
     """
+
+    came = ""
 
     def __init__(self, module: str, entries: Sequence[KernelEntry]) -> None:
         self._module = module
@@ -62,12 +68,39 @@ class Library:
 
     def file_name(self, processor: Processor) -> str:
         """Return the name under which the object is kept; another one is made of something else."""
-        layout = "\n".join(entry.layout for entry in self._entries)
-        return f"kernels-{processor.name}-{stamp(layout)[:32]}.o"
+        return f"kernels-{processor.name}-{self.stamp}.o"
+
+    def object(self) -> bytes:
+        """Return the object for this machine, compiled before or now, for a linker."""
+        return self._found(host())
+
+    def to_ship(self) -> dict[str, bytes]:
+        """Compile for every processor of `SHIPPED`.
+
+        Returns:
+            Contents by name of the files that belong into ``opspace/machine/objects``.
+        """
+        made = self._made(SHIPPED)
+        return {self._shipped(p): sealed(one) for p, one in zip(SHIPPED, made, strict=True)}
+
+    @cached_property
+    def stamp(self) -> str:
+        """What the object says of itself, and whoever relies on it must have been made for."""
+        return stamp_of(self._entries)
+
+    def _shipped(self, processor: Processor) -> str:
+        return f"kernels-{processor.kind}-{self.stamp}.o"
 
     def _found(self, processor: Processor) -> bytes:
+        if found := read_shipped(self._shipped(processor)):
+            self.came = "shipped"
+            return found
         name = self.file_name(processor)
-        return read(name) or self._compiled(name, processor)
+        if found := read(name):
+            self.came = "kept"
+            return found
+        self.came = "compiled"
+        return self._compiled(name, processor)
 
     def _compiled(self, name: str, processor: Processor) -> bytes:
         """Compile, keep that and say so; what somebody else has kept in the meantime goes first."""
@@ -80,15 +113,19 @@ class Library:
                 "written, and NUMBA_CACHE_DIR may name one; %s",
                 ESTIMATE,
             )
-        made = compile_apart(self._module, processor)
-        if made is None:
-            from opspace.machine.compile_object import compile_object  # noqa: PLC0415 - only now
-
-            made = compile_object(self._entries, processor)
+        (made,) = self._made((processor,))
         found = read(name)
         after = "; it is kept for the next start" if found or keep(name, made) else ""
         log.warning("compiled the control tick in %.0f s%s", time.perf_counter() - start, after)
         return found or made
+
+    def _made(self, processors: Sequence[Processor]) -> list[bytes]:
+        made = compile_apart(self._module, processors)
+        if made is None:
+            from opspace.machine.compile_object import compile_objects  # noqa: PLC0415 - only now
+
+            made = compile_objects(self._entries, processors)
+        return made
 
     def _linked(self, content: bytes, processor: Processor) -> dict[str, Any]:
         engine = self._engine = llvm.create_mcjit_compiler(

@@ -12,6 +12,7 @@ ENTRIES = (
         "opspace.kernels.many_states", "ticks", (float, TICK, STATES, int, int), releases=True
     ),
     KernelEntry("opspace.kernels.spectrum", "spectrum", (SPECTRUM,)),
+    KernelEntry("opspace.kernels.gravity", "gravity", (TICK,)),
 )
 
 KERNELS = Library(__name__, ENTRIES)

@@ -209,6 +209,7 @@ TICK = RecordTable(
     _work("later_q", ("nq",), "configuration in the middle of the tick", "rad, m"),
     _work("later_v", ("n",), "velocity then", "rad/s, m/s"),
     _work("change", ("n",), "by how much q̈ differs then", "rad/s²"),
+    _work("gravity", ("n",), "g, see `opspace.kernels.gravity`", "N·m"),
     _record("later", of=DYNAMICS),
     _record("later_inertia", of=INERTIA),
     _record("inertia", of=INERTIA),

@@ -133,6 +133,11 @@ class Stack:
         return self._transitions.settled()
 
     @property
+    def waiting(self) -> bool:
+        """Whether requests wait that have not begun."""
+        return self._transitions.waiting()
+
+    @property
     def time(self) -> float | None:
         """Time of the controller's last tick, s, or None before the first."""
         return self._transitions.now

@@ -68,6 +68,11 @@ class Transitions:
             due = any(queued.start <= now for queued in self._course.queue)
             return not due and all(member.settled(now) for member in self._course.members.values())
 
+    def waiting(self) -> bool:
+        """Tell whether requests wait."""
+        with self._lock:
+            return bool(self._course.queue)
+
     def present(self) -> tuple[Member, ...]:
         """Return the tasks of the last tick, or those there are at the start."""
         return self._ticked

@@ -1,0 +1,398 @@
+/* Everything of an exported controller that is not its mathematics; see opspace.h. */
+#include "opspace.h"
+#include "opspace_layout.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* The kernels. */
+extern int64_t opspace_tick(double t, void *handle);
+extern void opspace_gravity(void *handle);
+extern const char opspace_stamp[];
+
+/* Joined sums would round otherwise than in Python. */
+#if defined(__clang__)
+#pragma STDC FP_CONTRACT OFF
+#elif defined(__GNUC__)
+#pragma GCC optimize("fp-contract=off")
+#endif
+
+/* Columns of an activation in time. */
+enum { PROFILE, TARGET, START, DURATION, PHASE, RATE, ACCELERATION, WIDTH, CRUISE };
+
+struct opspace {
+    const opspace_model *model;
+    uint64_t *words;
+    void *handle;
+    double *q, *v, *tau, *M, *bias, *torque_limit, *option;
+    double *gravity, *variable, *own, *numbers, *goal, *kp, *kv;
+    int64_t *kind, *endless;
+    double before;
+    int begun;
+};
+
+static const opspace_field *find_field(const opspace *c, const char *name)
+{
+    for (int i = 0; i < c->model->fields; i++)
+        if (strcmp(c->model->field[i].name, name) == 0)
+            return &c->model->field[i];
+    return NULL;
+}
+
+static void *memory_of(const opspace *c, const char *name)
+{
+    const opspace_field *one = find_field(c, name);
+    return one ? c->words + one->first : NULL;
+}
+
+static void lay_out(opspace *c)
+{
+    const opspace_model *m = c->model;
+    const uint64_t *content = m->content;
+    for (int64_t i = 0; i < m->runs; i++) {
+        memcpy(c->words + m->run[i].first, content, (size_t)m->run[i].count * sizeof *content);
+        content += m->run[i].count;
+    }
+    for (int64_t i = 0; i < m->addresses; i++) {
+        uint64_t *word = c->words + m->address[i];
+        *word = (uint64_t)(uintptr_t)(c->words + *word);
+    }
+    c->handle = c->words + m->handle;
+}
+
+static void find_fields(opspace *c)
+{
+    c->q = memory_of(c, "q");
+    c->v = memory_of(c, "v");
+    c->tau = memory_of(c, "tau");
+    c->M = memory_of(c, "M");
+    c->bias = memory_of(c, "bias");
+    c->torque_limit = memory_of(c, "torque_limit");
+    c->option = memory_of(c, "option");
+    c->gravity = memory_of(c, "gravity");
+    c->variable = memory_of(c, "variable");
+    c->own = memory_of(c, "own");
+    c->numbers = memory_of(c, "numbers");
+    c->goal = memory_of(c, "goal");
+    c->kp = memory_of(c, "kp");
+    c->kv = memory_of(c, "kv");
+    c->kind = memory_of(c, "kind");
+    c->endless = memory_of(c, "endless");
+}
+
+opspace *opspace_open(const opspace_model *model)
+{
+    if (!model || strcmp(model->stamp, opspace_stamp) != 0)
+        return NULL;
+    opspace *c = calloc(1, sizeof *c);
+    if (!c)
+        return NULL;
+    c->model = model;
+    c->words = calloc((size_t)model->words, sizeof *c->words);
+    if (!c->words) {
+        free(c);
+        return NULL;
+    }
+    lay_out(c);
+    find_fields(c);
+    return c;
+}
+
+void opspace_close(opspace *c)
+{
+    if (c)
+        free(c->words);
+    free(c);
+}
+
+static int all_finite(const double *x, int count)
+{
+    for (int i = 0; i < count; i++)
+        if (!isfinite(x[i]))
+            return 0;
+    return 1;
+}
+
+static int equal(const double *a, const double *b, int count)
+{
+    for (int i = 0; i < count; i++)
+        if (a[i] != b[i])
+            return 0;
+    return 1;
+}
+
+static int moving(const double *v, int count)
+{
+    for (int i = 0; i < count; i++)
+        if (v[i] != 0.0)
+            return 1;
+    return 0;
+}
+
+/* Whether the tick comes when it should, with a state that is new. */
+static int64_t watch(const opspace *c, double t, const double *q, const double *v)
+{
+    const opspace_model *m = c->model;
+    int64_t found = 0;
+    if (m->period == 0.0 || !c->begun)
+        return 0;
+    double passed = t - c->before;
+    if (!(1e-6 * m->period < passed && passed <= TIME_JUMP_PERIODS * m->period))
+        found |= OPSPACE_TIME_JUMP;
+    else if (passed > TIME_LATE_PERIODS * m->period)
+        found |= OPSPACE_LATE;
+    if (moving(v, m->n) && equal(q, c->q, m->nq) && equal(v, c->v, m->n))
+        found |= OPSPACE_STALE;
+    return found;
+}
+
+static void brake(const opspace *c, double *tau)
+{
+    int n = c->model->n;
+    for (int i = 0; i < n; i++) {
+        double most = fmin(c->torque_limit[i], 1.7976931348623157e308);
+        double x = c->bias[i] - c->option[OPTION_DAMPING] * c->M[i * n + i] * c->v[i];
+        tau[i] = isnan(x) ? 0.0 : fmax(fmin(x, most), -most);
+    }
+}
+
+/* Leave to the robot what it adds. */
+static void without_gravity(const opspace *c, double *tau)
+{
+    if (!c->model->robot_adds)
+        return;
+    opspace_gravity(c->handle);
+    for (int i = 0; i < c->model->n; i++)
+        if (isfinite(c->gravity[i]))
+            tau[i] -= c->gravity[i];
+}
+
+int64_t opspace_step(opspace *c, double t, const double *q, const double *v, double *tau)
+{
+    const opspace_model *m = c->model;
+    if (!isfinite(t) || !all_finite(q, m->nq) || !all_finite(v, m->n))
+        return OPSPACE_NOT_FINITE;
+    int64_t timing = watch(c, t, q, v);
+    c->before = t;
+    c->begun = 1;
+    memcpy(c->q, q, (size_t)m->nq * sizeof *q);
+    memcpy(c->v, v, (size_t)m->n * sizeof *v);
+    int64_t answer = opspace_tick(t, c->handle);
+    if (answer < 0) {
+        brake(c, tau);
+        without_gravity(c, tau);
+        return timing | OPSPACE_FAULT;
+    }
+    memcpy(tau, c->tau, (size_t)m->n * sizeof *tau);
+    without_gravity(c, tau);
+    return answer % ANSWER_SOLVE | timing;
+}
+
+int opspace_find_task(const opspace *c, const char *name)
+{
+    for (int i = 0; i < c->model->tasks; i++)
+        if (strcmp(c->model->task[i].name, name) == 0)
+            return i;
+    return OPSPACE_NO_TASK;
+}
+
+static const opspace_task *task_at(const opspace *c, int task)
+{
+    return task < 0 || task >= c->model->tasks ? NULL : &c->model->task[task];
+}
+
+static int is_rotation(const double *R)
+{
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++) {
+            double product = 0.0;
+            for (int k = 0; k < 3; k++)
+                product += R[3 * i + k] * R[3 * j + k];
+            if (!(fabs(product - (i == j)) < 1e-6))
+                return 0;
+        }
+    double volume = R[0] * (R[4] * R[8] - R[5] * R[7]) - R[1] * (R[3] * R[8] - R[5] * R[6])
+        + R[2] * (R[3] * R[7] - R[4] * R[6]);
+    return volume > 0.0;
+}
+
+/* A target that jumps is another one, to which angles take the short way. */
+static int rotation_jumps(const double *before, const double *now)
+{
+    double trace = 0.0;
+    for (int i = 0; i < 9; i++)
+        trace += before[i] * now[i];
+    return 0.5 * (trace - 1.0) < cos(TARGET_STEP);
+}
+
+static int joints_jump(const opspace *c, const opspace_task *task, const double *x)
+{
+    for (int i = 0; i < task->rows; i++) {
+        double moved = x[i] - c->goal[3 * (task->first_row + i)];
+        moved -= 2.0 * HALF_TURN * nearbyint(moved / (2.0 * HALF_TURN));
+        if (fabs(moved) > TARGET_STEP)
+            return 1;
+    }
+    return 0;
+}
+
+static void copy(double *to, const double *from, int count)
+{
+    for (int i = 0; i < count; i++)
+        to[i] = from ? from[i] : 0.0;
+}
+
+static int finite_or_none(const double *x, int count)
+{
+    return !x || all_finite(x, count);
+}
+
+int opspace_set_target(
+    opspace *c, int task, const double *x, const double *velocity, const double *acceleration)
+{
+    const opspace_task *one = task_at(c, task);
+    if (!one)
+        return OPSPACE_NO_TASK;
+    int size = one->joints ? one->joints : (one->position ? 3 : 0) + (one->orientation ? 3 : 0);
+    int given = one->joints + one->position + one->orientation;
+    if (!all_finite(x, given) || !finite_or_none(velocity, size) || !finite_or_none(acceleration, size))
+        return OPSPACE_REFUSED;
+    int64_t *kind = c->kind + task * KIND_SIZE;
+    if (one->joints) {
+        if (joints_jump(c, one, x))
+            kind[KIND_REMEMBERS] = 0;
+        for (int i = 0; i < size; i++) {
+            double *goal = c->goal + 3 * (one->first_row + i);
+            goal[0] = x[i];
+            goal[1] = velocity ? velocity[i] : 0.0;
+            goal[2] = acceleration ? acceleration[i] : 0.0;
+        }
+        return 0;
+    }
+    double *number = c->numbers + task * NUMBERS_SIZE;
+    const double *R = x + one->position;
+    if (one->orientation) {
+        if (!is_rotation(R))
+            return OPSPACE_REFUSED;
+        if (rotation_jumps(number + NUMBERS_GOAL_ROTATION, R))
+            kind[KIND_REMEMBERS] = 0;
+        copy(number + NUMBERS_GOAL_ROTATION, R, 9);
+    }
+    if (one->position)
+        copy(number + NUMBERS_GOAL_POSITION, x, 3);
+    copy(number + NUMBERS_GOAL_VELOCITY, velocity, size);
+    copy(number + NUMBERS_GOAL_ACCELERATION, acceleration, size);
+    return 0;
+}
+
+int opspace_set_gains(opspace *c, int task, const double *kp, const double *kv)
+{
+    const opspace_task *one = task_at(c, task);
+    if (!one)
+        return OPSPACE_NO_TASK;
+    for (int i = 0; i < one->rows; i++)
+        if (!isfinite(kp[i]) || !isfinite(kv[i]) || kp[i] < 0.0 || kv[i] < 0.0)
+            return OPSPACE_REFUSED;
+    copy(c->kp + one->first_row, kp, one->rows);
+    copy(c->kv + one->first_row, kv, one->rows);
+    return 0;
+}
+
+int opspace_set_activation(opspace *c, int task, double activation)
+{
+    if (!task_at(c, task))
+        return OPSPACE_NO_TASK;
+    if (!(activation >= 0.0 && activation <= 1.0))
+        return OPSPACE_REFUSED;
+    c->own[task] = activation;
+    return 0;
+}
+
+/* Phase of an activation in time, its rate and its acceleration: the rate is led by a cubic from what
+ * it was to what it is to be, and stays there. */
+static void phase_at(const double *x, double t, double *s, double *rate, double *acceleration)
+{
+    double tau = fmax(t - x[START], 0.0), w = x[WIDTH];
+    if (tau >= x[DURATION]) {
+        *s = x[TARGET];
+        *rate = *acceleration = 0.0;
+        return;
+    }
+    if (tau >= w) {
+        double covered = w * ((x[RATE] + x[CRUISE]) / 2.0 + w * x[ACCELERATION] / 12.0);
+        *s = x[PHASE] + covered + x[CRUISE] * (tau - w);
+        *rate = x[CRUISE];
+        *acceleration = 0.0;
+        return;
+    }
+    double y = tau / w, y2 = pow(y, 2.0), y3 = pow(y, 3.0), y4 = pow(y, 4.0);
+    *s = x[PHASE] + w * (x[RATE] * (y4 / 2 - y3 + y)
+        + x[ACCELERATION] * w * (y4 / 4 - 2 * y3 / 3 + y2 / 2) + x[CRUISE] * (y3 - y4 / 2));
+    *rate = x[RATE] * (2 * y3 - 3 * y2 + 1) + x[ACCELERATION] * w * (y3 - 2 * y2 + y)
+        + x[CRUISE] * (3 * y2 - 2 * y3);
+    *acceleration = (x[CRUISE] - x[RATE]) * (6 * y - 6 * y2) / w
+        + x[ACCELERATION] * (3 * y2 - 4 * y + 1);
+}
+
+static void write_ramp(
+    double *x, double target, double t, double duration, double phase, double rate,
+    double acceleration, double width, double cruise)
+{
+    x[TARGET] = target;
+    x[START] = t;
+    x[DURATION] = duration;
+    x[PHASE] = phase;
+    x[RATE] = rate;
+    x[ACCELERATION] = acceleration;
+    x[WIDTH] = width;
+    x[CRUISE] = cruise;
+}
+
+int opspace_set_presence(opspace *c, int task, int present, double t, double duration)
+{
+    if (!task_at(c, task))
+        return OPSPACE_NO_TASK;
+    if (!isfinite(t) || !isfinite(duration) || duration < 0.0)
+        return OPSPACE_REFUSED;
+    double *x = c->variable + task * VARIABLE_SIZE, target = present ? 1.0 : 0.0;
+    double s, rate, acceleration;
+    if ((x[DURATION] == 0.0 || t >= x[START] + x[DURATION]) && x[TARGET] == target)
+        return 0;
+    if (duration < 1e-9) {
+        write_ramp(x, target, t, 0.0, target, 0.0, 0.0, 0.0, 0.0);
+        return 0;
+    }
+    phase_at(x, t, &s, &rate, &acceleration);
+    if (!(s > 0.0 && s < 1.0)) {
+        double edge = fmin(fmax(s, 0.0), 1.0), cruise = (target - edge) / duration;
+        write_ramp(x, target, t, duration, edge, cruise, 0.0, 0.0, cruise);
+        return 0;
+    }
+    double blend = 0.5 * duration;
+    if (rate != 0.0)
+        blend = fmin(blend, 0.25 / fabs(rate));
+    if (acceleration != 0.0)
+        blend = fmin(blend, 1.0 / sqrt(fabs(acceleration)));
+    double covered = blend * (rate / 2.0 + blend * acceleration / 12.0);
+    double cruise = (target - s - covered) / (duration - 0.5 * blend);
+    write_ramp(x, target, t, duration, s, rate, acceleration, blend, cruise);
+    return 0;
+}
+
+void opspace_restart(opspace *c)
+{
+    c->begun = 0;
+    for (int i = 0; i < c->model->tasks; i++)
+        c->kind[i * KIND_SIZE + KIND_REMEMBERS] = 0;
+}
+
+const double *opspace_read(const opspace *c, const char *name, int64_t *count)
+{
+    const opspace_field *one = find_field(c, name);
+    if (!one || one->whole)
+        return NULL;
+    if (count)
+        *count = one->count;
+    return (const double *)(c->words + one->first);
+}

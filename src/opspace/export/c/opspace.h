@@ -1,0 +1,122 @@
+/* An exported controller of opspace: from time and state to torque, without Python.
+ *
+ * Link opspace.c, the file of the controller, the kernels and the mathematics library (-lm). Nothing
+ * here locks, and only opspace_open allocates. One thread at a time may use a controller; different
+ * controllers, also of one model, are independent. Units are SI and radians, rotations 3 x 3 by rows.
+ */
+#ifndef OPSPACE_H
+#define OPSPACE_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "opspace_codes.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* A task, as it was exported. */
+typedef struct {
+    const char *name;
+    int first_row; /* of its rows among those of all tasks */
+    int rows;
+    int position;    /* numbers of a target: a position first, */
+    int orientation; /* then a rotation; */
+    int joints;      /* or joint positions */
+} opspace_task;
+
+/* An array that can be read. */
+typedef struct {
+    const char *name;
+    int64_t first; /* word where it begins */
+    int64_t count;
+    int whole; /* numbers are int64_t, and only the library's own */
+} opspace_field;
+
+typedef struct {
+    int64_t first;
+    int64_t count;
+} opspace_run;
+
+/* An exported controller as data; its source defines one under its own name. */
+typedef struct {
+    const char *stamp; /* of the kernels that it was made for */
+    int n;             /* joints */
+    int nq;            /* coordinates of a configuration */
+    int tasks;
+    const char *const *joint; /* names, in the order of v and tau */
+    const opspace_task *task;
+    int fields;
+    const opspace_field *field;
+    double period; /* s, between two steps; 0 where none was announced */
+    int robot_adds;    /* whether the robot adds the torque against gravity */
+    int64_t words; /* of its memory */
+    int64_t handle;
+    int64_t runs; /* pieces of it that are not zero, */
+    const opspace_run *run;
+    const uint64_t *content; /* what they hold, one after the other, */
+    int64_t addresses;
+    const int64_t *address; /* and which words hold the place of another one */
+} opspace_model;
+
+typedef struct opspace opspace;
+
+/* Make a controller that has not ticked yet.
+ *
+ * NULL where there is no memory, or where the kernels are not those that the model was made for. */
+opspace *opspace_open(const opspace_model *model);
+
+/* Give its memory back; NULL is none. */
+void opspace_close(opspace *controller);
+
+/* Compute the torque tau (n) for the state q (nq), v (n) at time t.
+ *
+ * Where the robot adds the torque against gravity, tau is what it adds that to.
+ * Returns what happened, a sum of OPSPACE_ statuses, 0 in an ordinary tick. With OPSPACE_FAULT tau is
+ * the torque against the bias with joint damping. OPSPACE_NOT_FINITE, negative: time or state is not
+ * finite, and tau is as it was. */
+int64_t opspace_step(opspace *controller, double t, const double *q, const double *v, double *tau);
+
+/* Number of a task, or OPSPACE_NO_TASK. */
+int opspace_find_task(const opspace *controller, const char *name);
+
+/* Send a task to a target, from the next step on.
+ *
+ * x is a position (3), then a rotation (9), or joint positions, as the task has them; velocity and
+ * acceleration are 3 numbers for each of position and rotation, or one for each joint, NULL for zero.
+ * Returns 0, OPSPACE_NO_TASK or OPSPACE_REFUSED: a number is not finite, or x holds no rotation. */
+int opspace_set_target(
+    opspace *controller, int task, const double *x, const double *velocity,
+    const double *acceleration);
+
+/* Change the gains of a task: kp in 1/s^2 and kv in 1/s, one for each of its rows.
+ *
+ * Returns 0, OPSPACE_NO_TASK or OPSPACE_REFUSED: a gain is negative or not finite. */
+int opspace_set_gains(opspace *controller, int task, const double *kp, const double *kv);
+
+/* Let a task come (present is 1) or go (0) from time t on, for so many seconds.
+ *
+ * A task on its way turns without a step. The torque follows as smoothly as the profile that the task
+ * was exported with. Returns 0, OPSPACE_NO_TASK or OPSPACE_REFUSED. */
+int opspace_set_presence(opspace *controller, int task, int present, double t, double duration);
+
+/* Multiply the presence of a task by an activation of one's own, from 0 to 1.
+ *
+ * It is the caller's to change it smoothly. Returns 0, OPSPACE_NO_TASK or OPSPACE_REFUSED. */
+int opspace_set_activation(opspace *controller, int task, double activation);
+
+/* Let time go on from anywhere at the next step, and angles take the short way. Tasks on their way in
+ * or out are at the new time where they would be without the pause. */
+void opspace_restart(opspace *controller);
+
+/* What the last step left, by a name of opspace_codes.h; NULL if there is none of that name.
+ *
+ * Count, if not NULL, becomes how many numbers it has. */
+const double *opspace_read(const opspace *controller, const char *name, int64_t *count);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

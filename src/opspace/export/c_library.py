@@ -1,0 +1,235 @@
+"""A controller as a C library: its numbers as a source, the kernels as an object, and a header."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+from importlib import metadata
+from pathlib import Path
+
+import numpy as np
+
+from opspace.command import Status
+from opspace.controller import Controller
+from opspace.controller.exported import Exported, exported
+from opspace.controller.reference import ReferenceController
+from opspace.controller.watchdog import JUMP, MISSED
+from opspace.errors import InputError
+from opspace.kernels import columns
+from opspace.machine.processor import host
+from opspace.plan.entries import KERNELS
+from opspace.plan.pack_task import Packed
+from opspace.plan.records import TICK
+from opspace.record.whole_file import whole_file
+from opspace.tasks.way_round import LARGEST_STEP
+
+SOURCES = Path(__file__).parent / "c"
+COLUMNS = {
+    "KIND": ("KIND_SIZE", "REMEMBERS"),
+    "NUMBERS": (
+        *("NUMBERS_SIZE", "GOAL_ROTATION", "GOAL_POSITION", "GOAL_VELOCITY"),
+        "GOAL_ACCELERATION",
+    ),
+    "VARIABLE": ("VARIABLE_SIZE",),
+    "OPTION": ("DAMPING",),
+    "ANSWER": ("SOLVE",),
+}
+"""What the C source must know of `opspace.kernels.columns`, by the array that has it."""
+NAME = re.compile(r"[A-Za-z_]\w*", re.ASCII)
+TARGETS = {
+    columns.POSITION: (3, 0, 0),
+    columns.ORIENTATION: (0, 9, 0),
+    columns.POSE: (3, 9, 0),
+}
+"""Numbers of a target: position, rotation, joints."""
+
+
+def export_c(
+    controller: ReferenceController,
+    directory: Path | str,
+    name: str = "controller",
+    *,
+    absent: Sequence[str] = (),
+    profile: str = "quintic",
+    overwrite: bool = False,
+) -> Path:
+    """Write a controller as files that a C or C++ program is linked with.
+
+    The program needs no Python, and its torque is that of `Controller.step` to the last bit. It
+    begins as a controller that has not ticked, with the tasks, targets and gains of this moment.
+
+    Args:
+        controller: A `Controller`.
+        directory: Where the files go; it is made.
+        name: Name of the model in C, and of its files.
+        absent: Names of tasks of the stack that are not there at first and come later.
+        profile: Profile of all transitions, see `opspace.Profile`.
+        overwrite: Replace files that are already there.
+
+    Returns:
+        The directory.
+
+    Raises:
+        InputError: The controller does something at its ticks that only Python can; the name is no
+            name in C; a file is there already or cannot be written.
+        UnknownNameError: The stack has no task of a name, or there is no such profile.
+    """
+    if not isinstance(controller, Controller):
+        raise InputError(f"only a Controller can be exported, not {type(controller).__name__}")
+    if not NAME.fullmatch(name) or name.startswith("opspace"):
+        raise InputError(f"{name!r} is no name for a model in C: letters, digits and _")
+    found = exported(controller, absent, profile)
+    files = {
+        "opspace_codes.h": _codes().encode(),
+        "opspace_layout.h": _layout().encode(),
+        f"{name}.h": _header(name, found).encode(),
+        f"{name}.c": _source(name, found).encode(),
+        "opspace_kernels.o": KERNELS.object(),
+        **{path.name: path.read_bytes() for path in sorted(SOURCES.iterdir())},
+    }
+    directory = Path(directory)
+    for file, content in files.items():
+        with whole_file(directory / file, overwrite=overwrite) as unfinished:
+            unfinished.write_bytes(content)
+    return directory
+
+
+def _codes() -> str:
+    """What a step answers, and what can be read after it."""
+    codes = {f"OPSPACE_{one.name}": int(one) for one in (Status(0), *Status)}
+    refused = {"NOT_FINITE": -1, "NO_TASK": -2, "REFUSED": -3}
+    codes |= {f"OPSPACE_{word}": code for word, code in refused.items()}
+    enum = "".join(f"    {word} = {code},\n" for word, code in codes.items())
+    read = "".join(
+        f" * {field.name} ({', '.join(map(str, field.shape))}): {field.meaning}"
+        f"{f' [{field.unit}]' if field.unit else ''}\n"
+        for field in TICK.fields
+        if field.lives == "reported" and field.dtype is np.float64
+    )
+    return (
+        f"{_written()}#ifndef OPSPACE_CODES_H\n#define OPSPACE_CODES_H\n\n"
+        f"enum {{\n{enum}}};\n\n/* Names for opspace_read:\n{read} */\n\n#endif\n"
+    )
+
+
+def _layout() -> str:
+    """What only the C source of the library uses."""
+    known = vars(columns)
+    lines = [
+        f"#define {word if word.endswith('_SIZE') else f'{array}_{word}'} {known[word]}\n"
+        for array, words in COLUMNS.items()
+        for word in words
+    ]
+    numbers = {
+        "TARGET_STEP": LARGEST_STEP,
+        "TIME_JUMP_PERIODS": JUMP,
+        "TIME_LATE_PERIODS": MISSED,
+        "HALF_TURN": np.pi,
+    }
+    lines += [f"#define {word} {float(x)!r}\n" for word, x in numbers.items()]
+    return f"{_written()}{''.join(lines)}"
+
+
+def _header(name: str, found: Exported) -> str:
+    """Declare the model, its sizes and the numbers of its tasks."""
+    guard = f"{name.upper()}_H"
+    sizes = {"N": found.plan.n, "NQ": found.robot.nq, "TASKS": len(found.plan.packed)}
+    numbers = {f"{name.upper()}_{word}": x for word, x in sizes.items()}
+    for i, packed in enumerate(found.plan.packed):
+        word = re.sub(r"\W", "_", packed.task.name, flags=re.ASCII)
+        if numbers.setdefault(f"{name.upper()}_TASK_{word}", i) != i:
+            raise InputError(f"in C the name of task {packed.task.name!r} is another task's, too")
+    enum = "".join(f"    {word} = {x},\n" for word, x in numbers.items())
+    return (
+        f'{_written()}#ifndef {guard}\n#define {guard}\n\n#include "opspace.h"\n\n'
+        f"enum {{\n{enum}}};\n\n"
+        f'#ifdef __cplusplus\nextern "C" {{\n#endif\n\nextern const opspace_model {name};\n\n'
+        "#ifdef __cplusplus\n}\n#endif\n\n#endif\n"
+    )
+
+
+def _source(name: str, found: Exported) -> str:
+    """Write the numbers of the model."""
+    words, runs = found.image.words, list(_runs(found.image.words))
+    content = [format(x, "#x") for first, count in runs for x in words[first : first + count]]
+    tasks = [_task(packed) for packed in found.plan.packed]
+    fields = [
+        f'{{"{field.name}", {found.image.first[field.name]}, {_size(found, field.name)}, '
+        f"{int(field.dtype is np.int64)}}}"
+        for field in TICK.fields
+        if field.name in found.image.first
+    ]
+    arrays = {
+        "const char *const joint": [_text(joint) for joint in found.robot.joint_names],
+        "const opspace_task task": tasks or ["{0}"],
+        "const opspace_field field": fields,
+        "const opspace_run run": [f"{{{first}, {count}}}" for first, count in runs],
+        "const uint64_t content": content,
+        "const int64_t address": [str(i) for i in found.image.addresses],
+    }
+    data = "".join(
+        f"static {declared}[] = {{\n{_wrapped(items)}}};\n" for declared, items in arrays.items()
+    )
+    members = [
+        _text(KERNELS.stamp),
+        *map(str, (found.plan.n, found.robot.nq, len(tasks))),
+        *("joint", "task", str(len(fields)), "field"),
+        *(repr(found.period), str(int(found.robot_adds))),
+        *map(str, (words.size, found.image.handle, len(runs))),
+        *("run", "content", str(found.image.addresses.size), "address"),
+    ]
+    return (
+        f'{_written()}#include "{name}.h"\n\n{data}\n'
+        f"const opspace_model {name} = {{\n{_wrapped(members)}}};\n"
+    )
+
+
+def _task(packed: Packed) -> str:
+    kind = packed._tick.kind[packed.index]
+    position, rotation, joints = (
+        (0, 0, packed.task.rows)
+        if kind[columns.KIND] == columns.JOINTS
+        else TARGETS[int(kind[columns.QUANTITY])]
+    )
+    rows = packed.rows
+    return (
+        f"{{{_text(packed.task.name)}, {rows.start}, {rows.stop - rows.start}, "
+        f"{position}, {rotation}, {joints}}}"
+    )
+
+
+def _size(found: Exported, name: str) -> int:
+    return getattr(found.plan.tick, name).size
+
+
+def _runs(words: np.ndarray) -> Iterator[tuple[int, int]]:
+    """Find the pieces that are not zero; most of the memory of a tick is, before the first one."""
+    there = np.flatnonzero(words)
+    if there.size:
+        breaks = np.flatnonzero(np.diff(there) > 1) + 1
+        for part in np.split(there, breaks):
+            yield int(part[0]), part.size
+
+
+def _wrapped(items: Sequence[str]) -> str:
+    """Lay items out in lines that an editor can show."""
+    lines, line = [], "   "
+    for item in items:
+        if len(line) + len(item) > 98:
+            lines.append(line)
+            line = "   "
+        line += f" {item},"
+    return "".join(f"{one}\n" for one in [*lines, line])
+
+
+def _text(word: str) -> str:
+    """Write a name as C's compiler reads it, in UTF-8."""
+    plain = "".join(
+        chr(byte) if 32 <= byte < 127 and chr(byte) not in '"\\?' else f"\\{byte:03o}"
+        for byte in word.encode()
+    )
+    return f'"{plain}"'
+
+
+def _written() -> str:
+    return f"/* Written by opspace {metadata.version('opspace')} for {host().cpu}. */\n"

@@ -1,0 +1,103 @@
+"""The memory of a tick as one piece that may lie anywhere, for programs without Python."""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from opspace.machine.record import WORD, Handle
+
+
+class Image(NamedTuple):
+    """All arrays and handles of a record in one row of words.
+
+    Whoever puts the words somewhere adds the place of the first one, in bytes, to each word that is
+    an address.
+
+    Attributes:
+        words: (N,) uint64, the contents; an address counts words from the first one.
+        addresses: Which words are addresses.
+        handle: Word where the handle of the record begins.
+        first: Word where each array of the record begins, by name; those without numbers are not
+            there.
+    """
+
+    words: np.ndarray
+    addresses: np.ndarray
+    handle: int
+    first: dict[str, int]
+
+
+def image(handle: Handle) -> Image:
+    """Copy everything that a handle leads to; what shares memory shares it in the copy."""
+    regions = _regions(sorted({_extent(array) for array in _arrays(handle)}))
+    words = [_content(*region) for region in regions]
+    ends = np.cumsum([part.size for part in words]).tolist()
+    begins = dict(zip((start for start, _ in regions), [0, *ends[:-1]], strict=True))
+    starts = np.array(list(begins), np.uintp)
+
+    def place(array: np.ndarray) -> int:
+        address, _ = _extent(array)
+        start = int(starts[np.searchsorted(starts, address, side="right") - 1])
+        return begins[start] + (address - start) // WORD
+
+    addresses: list[int] = []
+    used = ends[-1]
+
+    def put(one: Handle) -> int:
+        """Write the words of a handle after those that it leads to."""
+        nonlocal used
+        row: list[int] = []
+        relative: list[int] = []
+        for field in one.fields.values():
+            if isinstance(field, Handle):
+                relative.append(len(row))
+                row.append(put(field))
+                continue
+            if field.size:
+                relative.append(len(row))
+            row += [place(field) if field.size else 0, *field.shape]
+        begin, used = used, used + len(row)
+        words.append(np.array(row, np.uint64))
+        addresses.extend(begin + i for i in relative)
+        return begin
+
+    begin = put(handle)
+    found = {
+        name: place(field)
+        for name, field in handle.fields.items()
+        if not isinstance(field, Handle) and field.size
+    }
+    return Image(np.concatenate(words), np.array(sorted(addresses)), begin, found)
+
+
+def _arrays(handle: Handle) -> Iterator[np.ndarray]:
+    for field in handle.fields.values():
+        if isinstance(field, Handle):
+            yield from _arrays(field)
+        elif field.size:
+            yield field
+
+
+def _extent(array: np.ndarray) -> tuple[int, int]:
+    """Return where an array begins and ends."""
+    begin = array.__array_interface__["data"][0]
+    return begin, begin + array.nbytes
+
+
+def _regions(extents: list[tuple[int, int]]) -> list[tuple[int, int]]:
+    """Join what overlaps."""
+    found: list[tuple[int, int]] = []
+    for begin, end in extents:
+        if found and begin < found[-1][1]:
+            found[-1] = found[-1][0], max(end, found[-1][1])
+        else:
+            found.append((begin, end))
+    return found
+
+
+def _content(begin: int, end: int) -> np.ndarray:
+    return np.frombuffer(ctypes.string_at(begin, end - begin), np.uint64)

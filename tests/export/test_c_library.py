@@ -1,0 +1,332 @@
+"""A program in C computes what the controller computes, to the last bit."""
+
+import ctypes
+import shutil
+import subprocess
+
+import numpy as np
+import pytest
+
+import opspace as osc
+from opspace.export.c_library import export_c
+from opspace.plan.entries import KERNELS
+from opspace.plan.image import image
+from opspace.stack import Blending
+from tests.docs.pages import DOCS, commands_of
+from tests.docs.test_pages import programs_of, run_blocks
+
+CC = shutil.which("cc")
+with_cc = pytest.mark.skipif(CC is None, reason="no C compiler is installed (cc)")
+
+PROGRAM = """
+#include <stdio.h>
+#include <stdlib.h>
+#include "controller.h"
+
+/* Reads t, q and v again and again, and writes the status and the torque of each. */
+int main(void)
+{
+    enum { NUMBERS = 1 + CONTROLLER_NQ + CONTROLLER_N };
+    double given[NUMBERS], tau[1 + CONTROLLER_N];
+    opspace *c = opspace_open(&controller);
+    if (!c)
+        return EXIT_FAILURE;
+    while (fread(given, sizeof *given, NUMBERS, stdin) == NUMBERS) {
+        const double *q = given + 1, *v = q + CONTROLLER_NQ;
+        tau[0] = (double)opspace_step(c, given[0], q, v, tau + 1);
+        fwrite(tau, sizeof *tau, 1 + CONTROLLER_N, stdout);
+    }
+    opspace_close(c);
+    return EXIT_SUCCESS;
+}
+"""
+STRICT = ("-std=c99", "-Wall", "-Wextra", "-pedantic", "-Werror")
+
+
+def compiled(directory, *sources, out, options=()):
+    words = (*STRICT, *options, *sources, "opspace.c", "opspace_kernels.o", "-lm", "-o", out)
+    subprocess.run([CC, *words], cwd=directory, check=True)
+    return directory / out
+
+
+def start(name="puma560", later=False, **options):
+    """A controller with a task for the hand, one for how it is turned, and a posture."""
+    robot = osc.load_robot(name)
+    tool = robot.frame_id(robot.tool)
+    robot.update(robot.q_reference, np.zeros(robot.nv))
+    hand = osc.PositionTask(target=robot.position(tool) + 0.05)
+    turn = osc.OrientationTask(target=robot.rotation(tool).copy())
+    posture = osc.PostureTask(target=robot.q_reference)
+    stack = osc.Stack([hand, turn] if later else [hand, turn, posture], limits=osc.JointLimits())
+    return osc.Controller(robot, stack, period=1e-3, **options), (hand, turn, posture)
+
+
+def states(robot, count, spread, seed=0):
+    rng = np.random.default_rng(seed)
+    q = robot.q_reference + spread * rng.normal(size=(count, robot.nq))
+    v = spread * rng.normal(size=(count, robot.nv))
+    return 1e-3 * np.arange(count), q, v
+
+
+@with_cc
+@pytest.mark.parametrize("name", ["puma560", "ur5", "panda"])
+def test_a_program_gives_the_same_bits_in_random_states(name, tmp_path):
+    controller, _ = start(name, torque_limits="priority")
+    export_c(controller, tmp_path)
+    (tmp_path / "main.c").write_text(PROGRAM)
+    program = compiled(tmp_path, "main.c", "controller.c", out="program")
+    T, Q, V = states(controller.robot, 200, 0.5)
+    given = np.column_stack([T, Q, V])
+    done = subprocess.run([program], input=given.tobytes(), capture_output=True, check=True)
+    found = np.frombuffer(done.stdout).reshape(len(T), -1)
+    commands = [controller.step(*state) for state in zip(T.tolist(), Q, V, strict=True)]
+    np.testing.assert_array_equal(found[:, 1:], [command.tau for command in commands])
+    np.testing.assert_array_equal(found[:, 0], [int(command.status) for command in commands])
+    seen = {int(command.status) for command in commands}
+    assert len(seen) > 2, "the states should show more than ordinary ticks"
+
+
+class InC:
+    """The exported controller, called from here."""
+
+    def __init__(self, directory, controller, **options):
+        export_c(controller, directory, **options)
+        path = compiled(
+            directory, "controller.c", out="controller.so", options=("-shared", "-fPIC")
+        )
+        self.n, self.library = controller.robot.nv, ctypes.CDLL(str(path))
+        self.library.opspace_open.restype = ctypes.c_void_p
+        self.library.opspace_step.restype = ctypes.c_int64
+        self.library.opspace_read.restype = ctypes.c_void_p
+        model = ctypes.byref(ctypes.c_char.in_dll(self.library, "controller"))
+        self.own = ctypes.c_void_p(self.library.opspace_open(model))
+        assert self.own
+
+    def step(self, t, q, v):
+        tau = np.full(self.n, np.nan)
+        status = self.library.opspace_step(self.own, ctypes.c_double(t), *map(pointer, (q, v, tau)))
+        return status, tau
+
+    def set(self, what, task, *given):
+        i = self.library.opspace_find_task(self.own, task.name.encode())
+        words = [x if isinstance(x, int) else number_or_pointer(x) for x in given]
+        return getattr(self.library, f"opspace_set_{what}")(self.own, i, *words)
+
+    def read(self, name):
+        count = ctypes.c_int64()
+        found = self.library.opspace_read(self.own, name.encode(), ctypes.byref(count))
+        return (
+            None if found is None else np.array((ctypes.c_double * count.value).from_address(found))
+        )
+
+
+def pointer(array):
+    assert array.flags.c_contiguous
+    return ctypes.c_void_p(array.ctypes.data)
+
+
+def number_or_pointer(x):
+    if x is None:
+        return None
+    return ctypes.c_double(x) if isinstance(x, float) else pointer(x)
+
+
+def turned(angle):
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+
+
+@with_cc
+def test_what_is_asked_for_while_it_runs_gives_the_same_bits(tmp_path):
+    controller, (hand, turn, posture) = start(gravity="robot")
+    stack, other = controller.stack, InC(tmp_path, controller)
+    goal, R = hand._target.goal + 0.1, turned(2.0) @ turn._target.goal
+    bent = controller.robot.q_reference + 0.3
+    gains = np.array([50.0, 60.0, 70.0]), np.array([10.0, 11.0, 12.0])
+    statuses = set()
+    T, Q, V = states(controller.robot, 160, 0.05)
+    for k, (t, q, v) in enumerate(zip(T.tolist(), Q, V, strict=True)):
+        if k == 20:
+            hand.target, turn.target = goal, R
+            assert other.set("target", hand, goal, None, None) == 0
+            assert other.set("target", turn, turn._target.goal, None, None) == 0  # a bit rounder
+        if k in (40, 47):
+            stack.remove(posture, duration=0.02)
+            assert other.set("presence", posture, 0, t, 0.02) == 0
+        if k == 55:  # on its way out
+            stack.insert(posture, level=2, duration=0.015)
+            assert other.set("presence", posture, 1, t, 0.015) == 0
+        if k == 80:
+            posture.target = bent
+            assert other.set("target", posture, bent, None, None) == 0
+        if k == 100:
+            hand.kp, hand.kv = gains
+            assert other.set("gains", hand, *gains) == 0
+        if k == 120:
+            hand.activation = lambda robot, t: 0.25
+            assert other.set("activation", hand, 0.25) == 0
+        command = controller.step(t, q, v)
+        status, tau = other.step(t, q, v)
+        np.testing.assert_array_equal(tau, command.tau, err_msg=f"tick {k}")
+        assert status == command.status
+        np.testing.assert_array_equal(
+            other.read("h"), [command.tasks[one.name].activation for one in (hand, turn, posture)]
+        )
+        statuses.add(status)
+    assert other.read("nothing") is None
+    assert other.read("kind") is None, "whole numbers are not doubles"
+
+
+@with_cc
+def test_a_task_that_is_absent_at_first_comes_as_in_a_stack(tmp_path):
+    complete, (*_, posture) = start()
+    other = InC(tmp_path, complete, absent=[posture.name])
+    controller, (*_, guest) = start(later=True)
+    T, Q, V = states(controller.robot, 60, 0.05)
+    for k, (t, q, v) in enumerate(zip(T.tolist(), Q, V, strict=True)):
+        if k == 20:
+            controller.stack.insert(guest, level=2, duration=0.02)
+            assert other.set("presence", posture, 1, t, 0.02) == 0
+        command, (status, tau) = controller.step(t, q, v), other.step(t, q, v)
+        assert status == command.status
+        if k <= 20:
+            np.testing.assert_allclose(tau, command.tau, rtol=1e-9, atol=1e-9)
+        else:
+            np.testing.assert_array_equal(tau, command.tau)
+
+
+@with_cc
+def test_what_cannot_be_used_is_refused_and_changes_nothing(tmp_path):
+    controller, (hand, turn, posture) = start()
+    other = InC(tmp_path, controller)
+    t, q, v = 0.0, controller.robot.q_reference.copy(), np.zeros(controller.robot.nv)
+    first = controller.step(t, q, v)
+    bad, none = np.array([1.0, np.nan, 0.0] * 3), osc.PositionTask(name="nobody")
+    refused, no_task, not_finite = -3, -2, -1
+    assert other.set("target", hand, bad, None, None) == refused
+    assert other.set("target", turn, np.ones(9), None, None) == refused
+    assert other.set("target", turn, -np.eye(3), None, None) == refused
+    assert other.set("target", hand, np.zeros(3), bad, None) == refused
+    assert other.set("target", none, bad, None, None) == no_task
+    assert other.set("gains", hand, -np.ones(3), np.ones(3)) == refused
+    assert other.set("activation", hand, 1.5) == refused
+    assert other.set("presence", posture, 0, t, -1.0) == refused
+    assert other.set("presence", posture, 0, float("nan"), 1.0) == refused
+    status, tau = other.step(t, np.full_like(q, np.nan), v)
+    assert (status, np.isnan(tau).all()) == (not_finite, True), "the torque is as it was"
+    status, tau = other.step(t, q, v)
+    assert status == first.status
+    np.testing.assert_array_equal(tau, first.tau)
+    assert osc.Status(other.step(t + 0.1, q, v)[0]) & osc.Status.TIME_JUMP
+    other.library.opspace_restart(other.own)
+    assert other.step(t, q, v)[0] == first.status
+
+
+@with_cc
+def test_the_page_of_the_library_is_right(tmp_path):
+    page = DOCS / "how-to" / "c-library.md"
+    done = run_blocks(programs_of(page), tmp_path)
+    assert done.returncode == 0, done.stderr
+    (line,) = (one for one in commands_of(page) if one.startswith("cc "))
+    subprocess.run([CC, *STRICT, *line.split()[1:]], cwd=tmp_path, check=True)
+    done = subprocess.run([tmp_path / "hold"], capture_output=True, text=True, check=True)
+    assert done.stdout == "guest: 1\n"
+
+
+@with_cc
+def test_kernels_of_another_version_are_not_used(tmp_path):
+    controller, _ = start()
+    export_c(controller, tmp_path)
+    source = tmp_path / "controller.c"
+    source.write_text(source.read_text().replace(KERNELS.stamp, KERNELS.stamp[::-1]))
+    (tmp_path / "main.c").write_text(PROGRAM)
+    program = compiled(tmp_path, "main.c", "controller.c", out="program")
+    assert subprocess.run([program], stdin=subprocess.DEVNULL, check=False).returncode == 1
+
+
+def changed(**options):
+    return lambda: start(**options)[0]
+
+
+def with_task(task, **options):
+    def build():
+        robot = osc.load_robot("puma560")
+        return osc.Controller(robot, osc.Stack([task]), **options)
+
+    return build
+
+
+def on_its_way():
+    controller, (*_, posture) = start()
+    controller.stack.remove(posture, duration=1.0, start_time=5.0)
+    return controller
+
+
+X = (0.5, 0.1, 0.6)
+
+
+def own_activation():
+    task = osc.PositionTask(target=X)
+    task.activation = lambda robot, t: 1.0
+    return task
+
+
+@pytest.mark.parametrize(
+    ("build", "said"),
+    [
+        (changed(on_time_jump="hold"), "on_time_jump"),
+        (on_its_way, "a request that waits"),
+        (changed(blending=type("Mine", (Blending,), {})("chain")), "the blending Mine"),
+        (with_task(osc.PositionTask(name="hand")), "'hand' will hold"),
+        (
+            with_task(osc.PositionTask(target=osc.MinimumJerk(X, np.add(X, 0.1), 1.0))),
+            "reference in time",
+        ),
+        (with_task(osc.PositionTask(target=X, max_acceleration=1.0, max_speed=1.0)), "max_acc"),
+        (with_task(osc.PositionTask(target=X, ki=1.0)), "integral action"),
+        (with_task(own_activation()), "activation"),
+    ],
+)
+def test_what_only_python_can_do_is_refused_by_name(build, said, tmp_path):
+    with pytest.raises(osc.InputError, match=said):
+        export_c(build(), tmp_path)
+    assert not list(tmp_path.iterdir())
+
+
+def test_names_are_checked(tmp_path):
+    controller, _ = start()
+    with pytest.raises(osc.UnknownNameError, match="hnad"):
+        export_c(controller, tmp_path, absent=["hnad"])
+    with pytest.raises(osc.InputError, match="no name for a model in C"):
+        export_c(controller, tmp_path, "two words")
+    with pytest.raises(osc.UnknownNameError, match="quartic"):
+        export_c(controller, tmp_path, profile="quartic")
+    export_c(controller, tmp_path)
+    with pytest.raises(osc.InputError, match="already exists"):
+        export_c(controller, tmp_path)
+
+
+def test_an_image_leads_where_the_handle_leads():
+    controller, _ = start()
+    controller.warm_up()
+    controller.step(0.0, controller.robot.q_reference, np.zeros(controller.robot.nv))
+    handle = controller._plan.handle
+    found = image(handle)
+    words = found.words.copy()
+    words[found.addresses] = words[found.addresses] * 8 + words.ctypes.data
+
+    def same(one, address):
+        place = address
+        for name, field in one.fields.items():
+            (first,) = np.frombuffer((ctypes.c_uint64 * 1).from_address(place), np.uint64)
+            if not isinstance(field, np.ndarray):
+                same(field, int(first))
+                place += 8
+                continue
+            place += 8 * (1 + field.ndim)
+            if field.size:
+                assert words.ctypes.data <= first < words.ctypes.data + words.nbytes
+                kept = (ctypes.c_char * field.nbytes).from_address(int(first))
+                assert bytes(kept) == field.tobytes(), name
+
+    same(handle, words.ctypes.data + 8 * found.handle)
