@@ -36,9 +36,11 @@ class Status(IntFlag):
     joint came too fast to be stopped at its limit."""
     HANDOVER = 1024
     """The torque is on its way from or to another controller's."""
-    COLLISION = 8192
+    WRENCH_STALE = 2048
+    """A wrench that a task needs has not been measured lately; the task presses on without it."""
+    COLLISION = 4096
     """A pair of bodies is kept from coming nearer: tasks get less than they ask for."""
-    COLLISION_LOST = 16384
+    COLLISION_LOST = 8192
     """No torque of the motors keeps every pair of bodies apart, and the excess is as small as can be."""
     FAULT = 8
     """No finite torque was found; the command is bias compensation with damping."""

@@ -140,7 +140,7 @@ def change_within_tick(
 
     Args:
         robot: The robot at the beginning; it is there again in the end.
-        tau: (n,) torque, N·m.
+        tau: (n,) torque without what the world answers, N·m.
         acceleration: (n,) q̈ at the beginning, rad/s².
         period: Δt, s.
 

@@ -16,6 +16,7 @@ from opspace.controller.disturbance import DisturbanceObserver
 from opspace.controller.reference import ReferenceController
 from opspace.controller.stages import sum_of_hard_torques
 from opspace.controller.watchdog import Watchdog
+from opspace.controller.wrenches import Wrenches
 from opspace.errors import InputError
 from opspace.kernels.columns import (
     DAMPING,
@@ -99,14 +100,16 @@ class Controller(ReferenceController):
     _ready: Mapping[tuple[object, ...], Plan] = MappingProxyType({})
     _ahead: Mapping[int, tuple[Heritage, _LaidOut]] = MappingProxyType({})
 
-    def step(self, t: float, q: ArrayLike, v: ArrayLike) -> Command:  # noqa: PLR0912 - one piece is fast
+    def step(  # noqa: PLR0912 - one piece is fast
+        self, t: float, q: ArrayLike, v: ArrayLike, *, wrenches: Wrenches | None = None
+    ) -> Command:
         """Compute the torque for one state; see `ReferenceController.step`."""
         fixed = self._fixed
         if fixed is None:
             self.warm_up()
             fixed = self._fixed
             if fixed is None:
-                return super().step(t, q, v)
+                return super().step(t, q, v, wrenches=wrenches)
         robot, place, catch_up, watch, begin_tick, observer, tick = fixed
         if type(t) is not float or not isfinite(t):
             t = finite(t, "time")
@@ -128,6 +131,8 @@ class Controller(ReferenceController):
                 self._begin_anew()
                 return self._hold(t, STATUSES[timing])
         members = begin_tick(t)
+        if wrenches is not None or self._forces is not None:
+            timing |= int(self._sensed(t, wrenches, members))
         laid_out = self._laid_out
         if laid_out is None or members is not laid_out[0]:
             laid_out = self._lay_out(members)

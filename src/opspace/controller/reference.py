@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -17,6 +17,7 @@ from opspace.controller.integral import IntegralAction
 from opspace.controller.rates import check_damping, check_limits, with_period
 from opspace.controller.stages import Given, Law, Rules, sum_of_hard_torques, tick
 from opspace.controller.watchdog import Watchdog
+from opspace.controller.wrenches import Wrenches, WrenchInput
 from opspace.errors import InputError, unknown_name
 from opspace.law import Profile
 from opspace.plan.scales import DEFAULT_SINGULARITY, Scales, Singularity
@@ -24,7 +25,7 @@ from opspace.robots.adapter import AdapterBase
 from opspace.robots.payload import Payload
 from opspace.robots.protocol import Robot
 from opspace.stack import Blending, Member, Stack
-from opspace.tasks import CollisionAvoidance, JointLimits, Task, TrackingTask
+from opspace.tasks import CollisionAvoidance, ForceTask, JointLimits, Task, TrackingTask
 from opspace.tasks.validation import finite, numbers
 
 BIASES = ("joint", "task")
@@ -127,6 +128,7 @@ class ReferenceController:
         self._timing = None if period is None else Watchdog(period, on_time_jump)
         self._scales = Scales(robot, singularity)
         self._integral: IntegralAction | None = None
+        self._forces: WrenchInput | None = None
         stack.attach(self._prepared if period is None else self._paced(period))
         self.calibration = self._scales.calibration(list(stack))
         if stack.limits is not None:
@@ -140,7 +142,7 @@ class ReferenceController:
         self._collisions = collisions
         self._handover: Handover | None = None
         self._loading: Loading | None = None
-        self._plain = not self._robot_adds and self._integral is None
+        self._plain = self._needs_no_more()
         self._observer = _observer(stack.limits, robot.nv, torque_limits)
         self._rules = Rules(
             law,
@@ -167,6 +169,11 @@ class ReferenceController:
         self._scales.prepare(task)
         if self._integral is None and isinstance(task, TrackingTask) and task.ki is not None:
             self._integral = IntegralAction(self._robot, self._scales)
+            self._plain = False
+        if isinstance(task, ForceTask):
+            if self._forces is None:
+                self._forces = WrenchInput(self._robot)
+            self._forces.add(task)
             self._plain = False
 
     def __repr__(self) -> str:
@@ -268,10 +275,22 @@ class ReferenceController:
             )
         return found
 
+    def _needs_no_more(self) -> bool:
+        """Tell whether a command leaves as the tick has made it."""
+        return not self._robot_adds and self._integral is None and self._forces is None
+
+    def _sensed(self, t: float, wrenches: Wrenches | None, members: Sequence[Member]) -> Status:
+        """Hand the wrenches of a tick to the tasks that need them."""
+        if self._forces is None:
+            self._forces = WrenchInput(self._robot)
+        return self._forces.take(t, wrenches, members)
+
     def _finished(self, command: Command, members: Sequence[Member]) -> Command:
         """Learn from a tick, leave out what the robot adds, mix with another's torque in a handover."""
         if self._handover is None and self._integral is not None:
             self._integral.after(command, members)
+        if self._forces is not None:
+            self._forces.after(command)
         added, handover = self._added_by_robot(), self._handover
         if handover is None:
             return command._replace(tau=command.tau - added) if self._robot_adds else command
@@ -280,7 +299,7 @@ class ReferenceController:
         tau = handover.torque(command.t, command.tau - added, self.robot.torque_limit, added)
         if handover.done:
             self._handover = None
-            self._plain = not self._robot_adds and self._integral is None
+            self._plain = self._needs_no_more()
         return command._replace(tau=tau, status=command.status | Status.HANDOVER)
 
     def _added_by_robot(self) -> np.ndarray:
@@ -309,20 +328,31 @@ class ReferenceController:
         """Name of the blending."""
         return self._blending.name
 
-    def step(self, t: float, q: ArrayLike, v: ArrayLike) -> Command:
+    @property
+    def wrenches(self) -> Mapping[str, np.ndarray | None]:
+        """Wrenches that the last tick was given, (6,) N and N·m; None where nothing was new."""
+        return {} if self._forces is None else self._forces.given
+
+    def step(
+        self, t: float, q: ArrayLike, v: ArrayLike, *, wrenches: Wrenches | None = None
+    ) -> Command:
         """Compute the torque for one state.
 
         Args:
             t: Time, s.
             q: Configuration, (nq,).
             v: Velocity, (n,), rad/s.
+            wrenches: Wrench that the robot exerts on the environment, (6,) N and N·m in world axes at
+                the point of the task, by name of the frame; None in place of one where nothing new
+                has been measured. Only force tasks need them.
 
         Returns:
             The command; its torque is finite.
 
         Raises:
             InputError: The state has a wrong size or is not finite, or a reference or activation
-                gave unusable numbers; no torque has been computed.
+                gave unusable numbers; a force task lacks its wrench; no torque has been computed.
+            UnknownNameError: A wrench of a frame that the robot does not have.
         """
         t = finite(t, "time")
         robot = self.robot
@@ -333,7 +363,10 @@ class ReferenceController:
         if timing & Status.TIME_JUMP and self._holds:
             self._begin_anew()
             return self._hold(t, timing)
-        return self._answer(t, self.stack.begin_tick(t), timing)
+        members = self.stack.begin_tick(t)
+        if wrenches is not None or self._forces is not None:
+            timing |= self._sensed(t, wrenches, members)
+        return self._answer(t, members, timing)
 
     def _answer(self, t: float, members: Sequence[Member], timing: Status) -> Command:
         """Compute the torque of these tasks for the robot's present state."""

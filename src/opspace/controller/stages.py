@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -33,13 +33,14 @@ from opspace.law import (
     whiten,
 )
 from opspace.law.blending import combined
-from opspace.law.scalars import SCALED
+from opspace.law.scalars import SCALED, room_for
 from opspace.plan.scales import Scales
 from opspace.robots.protocol import Robot
 from opspace.stack import Blending, Member, Mixture, mixture, presences
 from opspace.tasks import JointLimits, PostureTask, TaskTerms, TrackingTask
 from opspace.tasks.activations import own_activation
 from opspace.tasks.collision_avoidance import CollisionAvoidance
+from opspace.tasks.validation import shown
 
 REST = ""
 """Name of the damping of what no task uses; tasks have names."""
@@ -121,8 +122,10 @@ class Given:
         q: Configuration, (nq,).
         v: (n,) velocity, rad/s.
         M: (n, n) inertia.
-        bias: (n,) Coriolis, centrifugal and gravity torque, N·m.
+        bias: (n,) Coriolis, centrifugal and gravity torque, N·m, with the reaction from `balance` on.
         torque_limit: (n,) what the motors give, N·m.
+        reaction: (n,) what tasks expect of the world, N·m; None for nothing.
+        part: How much of it the motors can give.
     """
 
     rules: Rules
@@ -134,6 +137,8 @@ class Given:
     M: np.ndarray
     bias: np.ndarray
     torque_limit: np.ndarray
+    reaction: np.ndarray | None = None
+    part: float = 1.0
 
 
 class Blend(NamedTuple):
@@ -169,6 +174,7 @@ def tick(k: Given) -> Answer | None:
     """
     h = activations(k)
     terms = evaluate_tasks(k)
+    k = balance(k, h, terms)
     mixed = blend(k, h)
     L = factor(k, terms)
     if L is None:
@@ -205,6 +211,40 @@ def activations(k: Given) -> list[float]:
 def evaluate_tasks(k: Given) -> list[TaskTerms]:
     """J, J̇ q̇ and f* of every task (Eq. 24)."""
     return [member.task.evaluate(k.robot, k.t) for member in k.members]
+
+
+def balance(k: Given, h: Sequence[float], terms: Sequence[TaskTerms]) -> Given:
+    """Count s Σ h_k g_k as bias, with s as far as the motors can give it.
+
+    The weights of the stacks that have task k sum to h_k, so this is what the blend of stacks that
+    each carry the torques of their own tasks comes to.
+
+    Raises:
+        InputError: A task of the user's own gave an unusable torque.
+    """
+    carried = [
+        activation * _balanced(k, member, term.torque)
+        for member, activation, term in zip(k.members, h, terms, strict=True)
+        if term.torque is not None
+    ]
+    if not carried:
+        return k
+    reaction = np.add.reduce(carried)
+    part = 1.0
+    if k.rules.keep_torque and k.rules.bias == "joint":
+        part = room_for(reaction, start_inside(k), k.torque_limit)
+        reaction = part * reaction
+    return replace(k, bias=k.bias + reaction, reaction=reaction, part=part)
+
+
+def _balanced(k: Given, member: Member, torque: np.ndarray) -> np.ndarray:
+    found = np.asarray(torque, dtype=float)
+    if found.shape != k.v.shape or not np.all(np.isfinite(found)):
+        raise InputError(
+            f"task {member.task.name!r}: its balanced torque at t = {k.t:.6g} s must be finite, of "
+            f"shape {k.v.shape}, got {shown(torque)}"
+        )
+    return found
 
 
 def blend(k: Given, h: Sequence[float]) -> Mixture:
@@ -344,7 +384,8 @@ def keep_bounds(
         tau, kept, acting, taken = realise(bounds, wanted, lambda: metric(L, tasks))
         acceleration = np.linalg.solve(k.M, tau - k.bias)
         if rules.period > 0.0 and k.q.size == k.v.size and bounds.near(acceleration):
-            change = change_within_tick(k.robot, tau, acceleration, rules.period)
+            own = tau if k.reaction is None else tau - k.reaction
+            change = change_within_tick(k.robot, own, acceleration, rules.period)
             later = bounds.after(change)
             tau, kept, acting, taken = realise(later, wanted, lambda: metric(L, tasks))
     if observer is not None:
@@ -371,7 +412,7 @@ def status(k: Given, tau: np.ndarray, info: LawInfo, found: Found) -> Status:
         bits |= Status.ABOVE_TORQUE_LIMIT
     if found.limits:
         bits |= Status.JOINT_LIMIT
-    if any(level.scale < 1.0 - SCALED for level in info.levels):
+    if k.part < 1.0 - SCALED or any(level.scale < 1.0 - SCALED for level in info.levels):
         bits |= Status.TORQUE_SCALED
     if any(np.any(level.activation < 1.0) for level in found.levels):
         bits |= Status.DIRECTION_OFF

@@ -26,8 +26,9 @@ POSITION, ORIENTATION, POSE = range(3)
     SPEED_LIMITED,
     COVERS_ALL,
     REMEMBERS,
-) = range(13)
-KIND_SIZE = 13
+    CARRIES,
+) = range(14)
+KIND_SIZE = 14
 
 # Columns of Tick.numbers: a task as numbers. Rotations are by rows, placements by columns.
 LOCAL = 0

@@ -86,7 +86,7 @@ def stop(work, limit, j):
     most = math.inf
     for a in range(work.v.shape[0]):
         if work.M[a, j] != 0.0:
-            room = max(work.torque_limit[a] - abs(work.bias[a]), 0.0)
+            room = max(work.torque_limit[a] - abs(work.balance[a]), 0.0)
             most = min(most, room / abs(work.M[a, j]))
     command = stopping_command(d, towards, limit[BRAKE], most, k1, period)
     if command < limit[COMMAND]:
@@ -139,7 +139,7 @@ def keep_bounds(work, stacks):
     n = work.v.shape[0]
     x = work.joint_acceleration
     for a in range(n):
-        x[a] = work.tau[a] - work.bias[a]
+        x[a] = work.tau[a] - work.balance[a]
     whiten(work.inertia, x)
     acceleration_of(work.inertia, x)
     for a in range(n):
@@ -174,7 +174,7 @@ def realise(work, stacks, n):
     x = work.joint_acceleration
     nearest_acceleration(work.inertia, x, work.bounds, work.distances)
     for a in range(n):
-        work.tau[a] = work.bias[a]
+        work.tau[a] = work.balance[a]
         for b in range(n):
             work.tau[a] += work.M[a, b] * x[b]
         if work.option[KEEP_TORQUE] != 0.0:
@@ -258,8 +258,8 @@ def _bounds(work, n):
         bounds.lower[a], bounds.upper[a] = -math.inf, math.inf
         bounds.least[a], bounds.most[a] = -math.inf, math.inf
         if work.option[KEEP_TORQUE] != 0.0:
-            bounds.least[a] = -work.torque_limit[a] - work.bias[a]
-            bounds.most[a] = work.torque_limit[a] - work.bias[a]
+            bounds.least[a] = -work.torque_limit[a] - work.balance[a]
+            bounds.most[a] = work.torque_limit[a] - work.balance[a]
     if work.option[LIMIT_BOUND] == 0.0:
         return
     for i in range(work.limit.shape[0]):
@@ -298,7 +298,7 @@ def look_ahead(work, n):
     if not factor(work.later.M, work.later_inertia):
         return False
     for a in range(n):
-        change[a] = work.tau[a] - work.later.bias[a]
+        change[a] = work.tau[a] - work.reaction[a] - work.later.bias[a]
     whiten(work.later_inertia, change)
     acceleration_of(work.later_inertia, change)
     for i in range(work.limit.shape[0]):

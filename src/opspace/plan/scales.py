@@ -12,7 +12,7 @@ from opspace.errors import InputError, unknown_name
 from opspace.law import SigmaBuffer
 from opspace.plan.calibration import Calibration, Workspace
 from opspace.robots.protocol import Robot
-from opspace.tasks import JointTask, PostureTask, Task
+from opspace.tasks import ForceTask, JointTask, PostureTask, Task
 
 
 @dataclass(frozen=True)
@@ -68,6 +68,11 @@ class Singularity:
 
 
 DEFAULT_SINGULARITY = Singularity()
+
+
+FORCE = 0.1
+"""Reference of the rows of forces as a part of that of motions. What such a row asks for is damping, and
+a speed that falls with σ, whose torques stay bounded where σ goes to zero: it fades much later."""
 
 
 class Scales:
@@ -154,4 +159,4 @@ class Scales:
             return np.full(task.rows, self.joint)
         if self._option.scale == "absolute":
             return np.ones(task.rows)
-        return workspace
+        return FORCE * workspace if isinstance(task, ForceTask) else workspace

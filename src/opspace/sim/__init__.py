@@ -3,3 +3,4 @@
 from opspace.sim.disturbances import Disturbances as Disturbances
 from opspace.sim.disturbances import Push as Push
 from opspace.sim.mujoco_plant import Plant as Plant
+from opspace.sim.surfaces import Surface as Surface

@@ -3,10 +3,16 @@
 from types import MappingProxyType
 
 from opspace.tasks.activations import ActivationProduct as ActivationProduct
+from opspace.tasks.activations import ActivationUnion as ActivationUnion
 from opspace.tasks.activations import DistanceBuffer as DistanceBuffer
 from opspace.tasks.activations import JointBuffer as JointBuffer
 from opspace.tasks.collision_avoidance import CollisionAvoidance as CollisionAvoidance
 from opspace.tasks.com import ComTask as ComTask
+from opspace.tasks.contact import Contact as Contact
+from opspace.tasks.contact import GiveWay as GiveWay
+from opspace.tasks.force import ForceTask as ForceTask
+from opspace.tasks.force import Touch as Touch
+from opspace.tasks.impedance import ImpedanceTask as ImpedanceTask
 from opspace.tasks.joint import JointTask as JointTask
 from opspace.tasks.joint_limits import JointLimits as JointLimits
 from opspace.tasks.kinds import TaskKind
