@@ -37,6 +37,7 @@ class Watch:
         self.tau: list[np.ndarray] = []
         self.errors: dict[str, list[float]] = {}
         self.sigma: list[float] = []
+        self.response: list[float] = []
         self.activation: list[float] = []
 
     def observe(self, q: np.ndarray, v: np.ndarray, command: osc.Command) -> None:
@@ -49,6 +50,7 @@ class Watch:
             self.errors.setdefault(name, []).append(task.error_norm)
         cartesian = [level for level in command.levels if "posture" not in level.tasks]
         self.sigma.append(min((s for level in cartesian for s in level.sigma), default=np.nan))
+        self.response.append(min((r for level in cartesian for r in level.response), default=1.0))
         self.activation.append(
             min((h for level in cartesian for h in level.activation), default=1.0)
         )

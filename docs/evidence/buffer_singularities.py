@@ -110,6 +110,7 @@ def stops() -> list[dict[str, str | float]]:
             {
                 "joint5": f"{goal:g}",
                 "sigma": done.seen.sigma[at],
+                "response": done.seen.response[at],
                 "activation": done.seen.activation[at],
                 "stop_error": 1e3 * done.seen.errors["orientation"][at],
             }

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from typing import NamedTuple
 
 from buffer_document import DOCS, EVIDENCE, number, read_csv, replace_block, table, write_csv
@@ -32,10 +33,10 @@ from opspace.plots.style import (
 CSV = EVIDENCE / "buffer_sweep.csv"
 DOCUMENT = DOCS / "singularities.md"
 ARMS = {"puma560": "PUMA 560", "ur5": "UR5", "panda": "Panda"}
-UPPERS = (0.15, 0.3, 0.6, 0.9, 1.2, 1.8)
-LOWER = 0.1
-RATIO = 6.0
-"""upper / lower in the second family."""
+UPPERS = (0.15, 0.3, 0.7, 1.2, 1.8)
+ONE = osc.Singularity(0.1, 0.6, release=1.0)
+"""One buffer, as in the paper, with the edges that are best for it."""
+ONE_UPPERS = (0.3, 0.6, 1.2)
 
 EDGE = 0.95
 """The reachable motion goes so far towards the edge of the workspace."""
@@ -56,23 +57,21 @@ class Look(NamedTuple):
 
 
 LOOKS = {
-    "puma560": Look(LINE_COLORS[0], (0.5, 39.0), (13.0, 6.0)),
-    "ur5": Look(LINE_COLORS[1], (3.0, 6.5), (10.0, 6.0)),
-    "panda": Look(LINE_COLORS[2], (0.04, 22.5), (-11.0, -13.0)),
+    "puma560": Look(LINE_COLORS[0], (0.5, 27.0), (13.0, 6.0)),
+    "ur5": Look(LINE_COLORS[1], (26.0, 3.5), (10.0, 6.0)),
+    "panda": Look(LINE_COLORS[2], (0.032, 26.0), (-11.0, -13.0)),
 }
 SHOWN = 1.2
 """Largest upper edge that is drawn."""
 
 
 def buffers() -> Iterator[osc.Singularity | None]:
-    """List no handling, the family of fixed lower edge, and that of fixed ratio."""
+    """List no handling, two buffers of several widths, and one buffer of several widths."""
     yield None
     for upper in UPPERS:
-        yield osc.Singularity(LOWER, upper)
-    for upper in UPPERS:
-        lower = round(upper / RATIO, 4)
-        if lower != LOWER:
-            yield osc.Singularity(lower, upper)
+        yield replace(DEFAULT, upper=upper)
+    for upper in ONE_UPPERS:
+        yield replace(ONE, upper=upper)
 
 
 def circle(reach: Reach, singularity: osc.Singularity | None) -> Run:
@@ -112,13 +111,14 @@ def everything() -> list[dict[str, str | float]]:
     for arm in ARMS:
         reach = Reach.of(arm)
         for option in buffers():
-            edges = {"lower": option.lower, "upper": option.upper} if option else NONE
+            edges = {key: getattr(option, key) for key in EDGES} if option else NONE
             rows.append({"robot": arm, **edges, **measure(reach, option)})
             print(rows[-1], flush=True)
     return rows
 
 
-NONE: Mapping[str, str] = {"lower": "", "upper": ""}
+EDGES = ("lower", "upper", "release")
+NONE: Mapping[str, str] = dict.fromkeys(EDGES, "")
 
 
 def buffer_table(rows: list[dict[str, str]]) -> str:
@@ -126,23 +126,25 @@ def buffer_table(rows: list[dict[str, str]]) -> str:
     heads = ["buffer", "circle [mm]"]
     for title in ARMS.values():
         heads += [f"{title}: near the edge [mm]", "torque step [N·m]", "joint speed [rad/s]"]
-    lines: dict[tuple[str, str], list[str]] = {}
-    circles: dict[tuple[str, str], float] = {}
+    lines: dict[tuple[str, ...], list[str]] = {}
+    circles: dict[tuple[str, ...], float] = {}
     for row in rows:
-        edges = row["lower"], row["upper"]
+        edges = tuple(row[key] for key in EDGES)
         values = (1e3 * float(row["edge_error"]), float(row["torque_step"]))
         cells = lines.setdefault(edges, [])
         cells += [number(x) for x in (*values, float(row["joint_speed"]))]
         circles[edges] = max(circles.get(edges, 0.0), 1e3 * float(row["circle_error"]))
-    order = sorted(lines, key=lambda edges: (float(edges[1] or 0.0), float(edges[0] or 0.0)))
+    order = sorted(lines, key=lambda edges: [float(edges[k] or 0.0) for k in (2, 1, 0)])
     return table(heads, [[_name(edges), number(circles[edges]), *lines[edges]] for edges in order])
 
 
-def _name(edges: tuple[str, str]) -> str:
-    if not edges[0]:
+def _name(edges: tuple[str, ...]) -> str:
+    lower, upper, release = edges
+    if not lower:
         return "none"
-    text = f"{edges[0]} – {edges[1]}"
-    return f"**{text}**" if edges == ("0.1", "0.6") else text
+    text = f"{lower} – {upper}{', one' if float(release) == 1.0 else ''}"
+    default = f"{DEFAULT.lower:g}", f"{DEFAULT.upper:g}", f"{DEFAULT.release:g}"
+    return f"**{text}**" if edges == default else text
 
 
 def trade_off(rows: list[dict[str, str]]) -> Figure:
@@ -173,11 +175,12 @@ def _draw_arm(
     panel: Axes, rows: list[dict[str, str]], key: str, look: Look, *, named: bool
 ) -> None:
     points = sorted(
-        (float(r["upper"]), float(r["lower"]), float(r[key]), 1e3 * float(r["edge_error"]))
+        (float(r["upper"]), float(r["release"]), float(r[key]), 1e3 * float(r["edge_error"]))
         for r in rows
+        if r["upper"]
     )
-    fixed = [(upper, x, y) for upper, lower, x, y in points if lower == LOWER]
-    other = [(x, y) for _, lower, x, y in points if lower != LOWER]
+    fixed = [(upper, x, y) for upper, release, x, y in points if release < 1.0]
+    other = [(x, y) for _, release, x, y in points if release == 1.0]
     color = look.color
     panel.plot([x for _, x, _ in fixed], [y for *_, y in fixed], "o-", color=color, ms=4)
     panel.plot(*zip(*other, strict=True), "o", color=color, ms=5, mfc="white", zorder=3)

@@ -10,10 +10,11 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from opspace.command import Command as Command
     from opspace.command import ContactStatus as ContactStatus
+    from opspace.command import Distance as Distance
     from opspace.command import LevelStatus as LevelStatus
     from opspace.command import Status as Status
     from opspace.command import TaskStatus as TaskStatus
-    from opspace.contacts import Contact as Contact
+    from opspace.contacts import GroundContact as GroundContact
     from opspace.contacts import PointContact as PointContact
     from opspace.contacts import SoleContact as SoleContact
     from opspace.controller import Controller as Controller
@@ -54,19 +55,32 @@ if TYPE_CHECKING:
     from opspace.robots import Payload as Payload
     from opspace.robots import Robot as Robot
     from opspace.robots import RobotInfo as RobotInfo
+    from opspace.robots import WristSensor as WristSensor
     from opspace.robots import available_robots as available_robots
     from opspace.robots import load_robot as load_robot
+    from opspace.robots.shapes import LinkCapsule as LinkCapsule
     from opspace.sim import Ground as Ground
     from opspace.sim import Plant as Plant
+    from opspace.sim import Surface as Surface
     from opspace.sim import Wall as Wall
     from opspace.stack import Stack as Stack
     from opspace.tasks import ActivationProduct as ActivationProduct
+    from opspace.tasks import ActivationUnion as ActivationUnion
     from opspace.tasks import AngularMomentumTask as AngularMomentumTask
+    from opspace.tasks import Ball as Ball
+    from opspace.tasks import Box as Box
+    from opspace.tasks import Capsule as Capsule
     from opspace.tasks import Chain as Chain
     from opspace.tasks import Circle as Circle
+    from opspace.tasks import CollisionAvoidance as CollisionAvoidance
     from opspace.tasks import ComTask as ComTask
     from opspace.tasks import Constant as Constant
+    from opspace.tasks import Contact as Contact
     from opspace.tasks import DistanceBuffer as DistanceBuffer
+    from opspace.tasks import ForceTask as ForceTask
+    from opspace.tasks import GiveWay as GiveWay
+    from opspace.tasks import HalfSpace as HalfSpace
+    from opspace.tasks import ImpedanceTask as ImpedanceTask
     from opspace.tasks import JerkLimited as JerkLimited
     from opspace.tasks import JointBuffer as JointBuffer
     from opspace.tasks import JointLimits as JointLimits
@@ -86,14 +100,15 @@ if TYPE_CHECKING:
     from opspace.tasks import Sample as Sample
     from opspace.tasks import Task as Task
     from opspace.tasks import TaskTerms as TaskTerms
+    from opspace.tasks import Touch as Touch
     from opspace.tasks import TrackingTask as TrackingTask
     from opspace.tasks import ViaPoints as ViaPoints
     from opspace.view import RunRequest as RunRequest
     from opspace.view import Viewer as Viewer
 
 _NAMES = {
-    "opspace.command": "Command ContactStatus LevelStatus Status TaskStatus",
-    "opspace.contacts": "Contact PointContact SoleContact",
+    "opspace.command": "Command ContactStatus Distance LevelStatus Status TaskStatus",
+    "opspace.contacts": "GroundContact PointContact SoleContact",
     "opspace.controller": "Controller",
     "opspace.errors": (
         "InputError MissingExtraError ModelError ModelWarning OpspaceError RecordingError ScenarioError "
@@ -107,19 +122,21 @@ _NAMES = {
     "opspace.record.black_box": "BlackBox",
     "opspace.record.observer": "TickRecorder",
     "opspace.record.replay": "Replay replay",
-    "opspace.robots": "Payload Robot RobotInfo available_robots load_robot",
+    "opspace.robots": "Payload Robot RobotInfo WristSensor available_robots load_robot",
+    "opspace.robots.shapes": "LinkCapsule",
     "opspace.loop": "AnyPlant Observer Outcome Stepping StopRule simulate",
     "opspace.plan.calibration": "Calibration",
     "opspace.plan.scales": "Singularity",
-    "opspace.sim": "Ground Plant Wall",
+    "opspace.sim": "Ground Plant Surface Wall",
     "opspace.stack": "Stack",
     "opspace.tasks": (
-        "ActivationProduct AngularMomentumTask Chain Circle ComTask Constant DistanceBuffer "
-        "JerkLimited JointBuffer "
-        "JointLimits JointTask MinimumJerk OrientationJerkLimited OrientationMinimumJerk "
-        "OrientationTask PoseReference PoseTask PositionTask PostureTask Reference "
-        "RelativeOrientationTask RelativePoseTask RelativePositionTask Sample Task TaskTerms "
-        "TrackingTask ViaPoints"
+        "ActivationProduct ActivationUnion AngularMomentumTask Ball Box Capsule Chain Circle "
+        "CollisionAvoidance "
+        "ComTask Constant Contact DistanceBuffer ForceTask GiveWay HalfSpace ImpedanceTask "
+        "JerkLimited JointBuffer JointLimits JointTask MinimumJerk OrientationJerkLimited "
+        "OrientationMinimumJerk OrientationTask PoseReference PoseTask PositionTask PostureTask "
+        "Reference RelativeOrientationTask RelativePoseTask RelativePositionTask Sample Task "
+        "TaskTerms Touch TrackingTask ViaPoints"
     ),
     "opspace.view": "RunRequest Viewer",
 }

@@ -36,12 +36,18 @@ class Status(IntFlag):
     joint came too fast to be stopped at its limit."""
     HANDOVER = 1024
     """The torque is on its way from or to another controller's."""
-    GIVEN_UP = 2048
+    WRENCH_STALE = 2048
+    """A wrench that a task needs has not been measured lately; the task presses on without it."""
+    COLLISION = 4096
+    """A pair of bodies is kept from coming nearer: tasks get less than they ask for."""
+    COLLISION_LOST = 8192
+    """No torque of the motors keeps every pair of bodies apart, and the excess is as small as can be."""
+    GIVEN_UP = 16384
     """Contacts, motors or joints do not allow what the tasks want, and more than a thousandth of the
     weight was given up."""
-    CONTACT_WAITS = 4096
+    CONTACT_WAITS = 32768
     """A contact that is to go stays, because the others cannot carry what it does."""
-    NOT_BALANCED = 8192
+    NOT_BALANCED = 65536
     """What was given up is more than 0.3 weights: the robot will fall if this lasts."""
     FAULT = 8
     """No finite torque was found; the command is bias compensation with damping."""
@@ -119,8 +125,27 @@ class ContactStatus:
     waiting: bool
 
 
+@dataclass(frozen=True, slots=True)
+class Distance:
+    """Two bodies in one tick.
+
+    Attributes:
+        distance: Between their shapes, m; below zero where they overlap.
+        taken: By how much the pair slows down how fast its distance shrinks, m/s²; 0 where it does
+            not act.
+    """
+
+    distance: float
+    taken: float
+
+
 class Report(Protocol):
     """What a tick tells about tasks, levels and limits, perhaps worked out only when asked."""
+
+    @property
+    def distances(self) -> Mapping[str, Distance]:
+        """Pairs of bodies that are kept apart, by "body/body", the nearest first."""
+        ...
 
     @property
     def tasks(self) -> Mapping[str, TaskStatus]:
@@ -153,6 +178,7 @@ class Found:
     tasks: Mapping[str, TaskStatus]
     levels: tuple[LevelStatus, ...]
     limits: Mapping[str, float]
+    distances: Mapping[str, Distance] = field(default_factory=dict)
     contacts: Mapping[str, ContactStatus] = field(default_factory=dict[str, ContactStatus])
 
 
@@ -197,3 +223,8 @@ class Command(NamedTuple):
     def contacts(self) -> Mapping[str, ContactStatus]:
         """Status of each contact by name."""
         return self.report.contacts
+
+    @property
+    def distances(self) -> Mapping[str, Distance]:
+        """Pairs of bodies that are kept apart, by "body/body", the nearest first."""
+        return self.report.distances

@@ -44,7 +44,7 @@ def seen(monkeypatch):
 
 def test_no_kernel_is_given_memory_that_is_free_again(seen):
     q, v = PANDA.q_reference, np.zeros(7)
-    driver = osc.Controller(PANDA, stack())
+    driver = osc.Controller(PANDA, stack(), gravity="robot")
     assert driver.step(0.0, q, v).levels[0].sigma.size == 6
     driver.torque_batch(np.stack([q, q]), np.stack([v, v]))
     assert seen == {entry.name for entry in ENTRIES}

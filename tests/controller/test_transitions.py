@@ -67,10 +67,11 @@ def hard_torques(controller, stacks, t):
             )
             for task, level in sorted(stack, key=lambda pair: (pair[1], pair[0].name))
         ]
-        rest = -controller.damping * (L.T @ robot.v)
+        motion = L.T @ robot.v
+        rest = -controller.damping * motion
         sets.append(TaskSet(L.T, rest, len(rank), sigma_reference=scales.unit))
         everything = [Weighted(1.0, frozenset(range(len(sets))))]
-        result[stack] = blended_torque(L, sets, everything, scales.buffer)[0]
+        result[stack] = blended_torque(L, sets, everything, scales.buffer, motion=motion)[0]
     return result
 
 
@@ -203,7 +204,7 @@ def old_torque(controller, levels, q, v):
         rest = -controller.damping * (L.T @ v)
         sets.append(TaskSet(L.T, rest, len(levels), 1.0, "damping", scales.unit))
     blend = corners([1.0] * len(sets), "idv")
-    tau, _ = blended_torque(L, sets, blend, scales.buffer, want_spectra=True)
+    tau, _ = blended_torque(L, sets, blend, scales.buffer, want_spectra=True, motion=L.T @ v)
     return tau + robot.bias
 
 

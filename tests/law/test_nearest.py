@@ -12,6 +12,7 @@ from opspace.law import nearest_acceleration, task_metric
 from opspace.law.hierarchy import Level, WhitenedTask
 from opspace.law.nearest import nearest_point
 from opspace.law.scalars import CLEANINGS, HARD, SOFT
+from opspace.plan.distance_records import DISTANCES
 from opspace.plan.memory import make_inertia
 from opspace.plan.records import BOUNDS
 
@@ -111,14 +112,15 @@ def test_it_is_the_nearest_in_the_metric(seed):
 def test_compiled_is_readable(seed, contradictory):
     L, W, start, *bounds = problem(seed, contradictory)
     x = start.copy()
-    given_ = BOUNDS.make({"n": x.size})
+    given_ = BOUNDS.make({"n": x.size, "distances": 0})
+    none = DISTANCES.make({"n": x.size, "balls": 0, "sets": 0, "distances": 0})
     for array, values in zip(given_, bounds, strict=False):
         array[:] = values
     inertia = make_inertia(np.arange(x.size) - 1)
     assert factor(L @ L.T, inertia.handle())
     change = np.linalg.solve(np.triu(inertia.U), L)  # it factors the inertia from the other end
     given_.W[:] = change @ W @ change.T
-    compiled(inertia.handle(), x, given_.handle())
+    compiled(inertia.handle(), x, given_.handle(), none.handle())
     readable = nearest_acceleration(L, W, start, *bounds)
     R = np.linalg.cholesky(W).T @ L.T
     size = 1.0 + np.linalg.norm(R @ start) + np.linalg.norm(R @ readable.acceleration)

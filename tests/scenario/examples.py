@@ -88,6 +88,13 @@ joint_limits:
   profile: tanh
   joints:
     joint1: [-0.75, 0.75]
+collisions:
+  margin: 0.02
+  brake: 3.0
+  pairs: none
+  obstacles:
+    ball: {shape: ball, radius: 0.1, position: [3.0, 0.0, 0.0], velocity: [0.0, 0.01, 0.0]}
+    wall: {shape: half-space, normal: [0.0, 0.0, 1.0], position: [0.0, 0.0, -2.0]}
 singularity:
   scale: absolute
   lower: 0.01

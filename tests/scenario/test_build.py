@@ -101,7 +101,7 @@ def test_a_method_changes_profiles_and_nothing_else(method):
         return
     expected = ("cubic", "quintic") if method == "transition" else ("step", "step")
     assert (singularity.profile, limits.profile) == expected
-    assert (singularity.lower, singularity.upper) == (0.1, 0.6)
+    assert (singularity.lower, singularity.upper) == (0.05, 0.7)
 
 
 def test_tasks_find_the_start_and_ask_for_nothing():

@@ -16,7 +16,7 @@ from opspace.scenario.document import key_text, parse, to_yaml
 from tests.scenario.examples import EVERYTHING
 
 DATA = parse(EVERYTHING).data
-NAMED = {("tasks",), ("locked",), ("joint_limits", "joints")}
+NAMED = {("tasks",), ("locked",), ("joint_limits", "joints"), ("collisions", "obstacles")}
 """Mappings whose keys are names of the user's."""
 
 

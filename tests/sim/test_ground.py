@@ -103,5 +103,5 @@ def test_what_cannot_be_is_refused():
         Ground(soles(), friction=0.0)
     with pytest.raises(InputError, match="no body or site 'nose'"):
         osc.Plant(robot, standing(robot), ground=Ground([osc.PointContact("nose")]))
-    with pytest.raises(InputError, match="at least one substep"):
+    with pytest.raises(InputError, match="at least one step of the simulation"):
         osc.Plant(robot, standing(robot), substeps=0)

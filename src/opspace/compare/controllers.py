@@ -19,6 +19,7 @@ from opspace.compare.laws import (
 )
 from opspace.controller import ReferenceController
 from opspace.controller.stages import Law, Question
+from opspace.controller.wrenches import Wrenches
 from opspace.law import LawInfo, task_torque
 from opspace.robots.protocol import Robot
 from opspace.stack import Blending, Stack
@@ -82,9 +83,11 @@ class RateClampController(ReferenceController):
         super().__init__(*args, **options)
         self._sent: tuple[float, np.ndarray] | None = None
 
-    def step(self, t: float, q: ArrayLike, v: ArrayLike) -> Command:
+    def step(
+        self, t: float, q: ArrayLike, v: ArrayLike, *, wrenches: Wrenches | None = None
+    ) -> Command:
         """See `opspace.Controller.step`."""
-        command = super().step(t, q, v)
+        command = super().step(t, q, v, wrenches=wrenches)
         tau = command.tau
         if self._sent is not None:
             before, sent = self._sent

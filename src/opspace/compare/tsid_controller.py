@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike
 from opspace.command import Command, Found, Status, TaskStatus
 from opspace.compare.laws import SOFTNESS
 from opspace.controller import ReferenceController
+from opspace.controller.wrenches import Wrenches
 from opspace.errors import InputError
 from opspace.stack import Member
 from opspace.tasks import PostureTask
@@ -42,14 +43,20 @@ class TsidController(ReferenceController):
 
     _program: Any = None
 
-    def step(self, t: float, q: ArrayLike, v: ArrayLike) -> Command:
+    def step(
+        self, t: float, q: ArrayLike, v: ArrayLike, *, wrenches: Wrenches | None = None
+    ) -> Command:
         """See `opspace.Controller.step`."""
         q, v = np.array(q, dtype=float), np.array(v, dtype=float)
         robot = self.robot
         robot.update(q, v)
         if self._program is None:
+            if self.collisions is not None:
+                raise InputError("this form of TSID keeps nothing apart: run it without collisions")
             self._program = Program(self)
         members = self.stack.begin_tick(float(t))
+        if wrenches is not None or self._forces is not None:
+            raise InputError("the method tsid cannot press: it has no force tasks")
         tau, solved = self._program.solve(t, q, v, members)
         status = Status.OK if solved and np.all(np.isfinite(tau)) else Status.FAULT
         if status:

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from opspace.contacts.contact import Contact
+from opspace.contacts.ground_contact import GroundContact
 from opspace.errors import InputError
 from opspace.law.cones import point_cone, point_metric
 from opspace.tasks.validation import Array, finite_array
 
 
-class PointContact(Contact):
+class PointContact(GroundContact):
     """Holds a point on a surface and lets its frame turn: three rows, a friction pyramid.
 
     Args:

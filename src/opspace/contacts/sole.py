@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from numpy.typing import ArrayLike
 
-from opspace.contacts.contact import Contact
+from opspace.contacts.ground_contact import GroundContact
 from opspace.law.cones import sole_cone, sole_metric
 from opspace.tasks.validation import Array
 
 
-class SoleContact(Contact):
+class SoleContact(GroundContact):
     """Holds a rectangle flat on a surface: six rows, and every force that its corners can carry.
 
     Args:

@@ -62,6 +62,11 @@ class Batch:
         self.robot = robot
         self._plans = [planned(members, _axes(model)) for _ in range(threads)]
 
+    @property
+    def plan(self) -> Plan:
+        """What one of the threads works with."""
+        return self._plans[0]
+
     def disturb(self, acceleration: np.ndarray) -> None:
         """Tell the joint limits what comes on top of the commanded accelerations, (n,) rad/s²."""
         for plan in self._plans:

@@ -10,8 +10,9 @@ from typing import NamedTuple
 import numpy as np
 
 from opspace.command import NO_CONTACTS, ContactStatus, Status
+from opspace.controller.collisions import DistanceTerms
 from opspace.controller.limit_task_sets import LimitTerms
-from opspace.law import BROKEN, LOST, excess, nearest_acceleration
+from opspace.law import BROKEN, LOST, excess, excess_of_rows, nearest_acceleration
 from opspace.robots.protocol import Robot
 
 
@@ -24,6 +25,7 @@ class Bounds:
         M: (n, n) inertia.
         bias: (n,) Coriolis, centrifugal and gravity torque, N·m.
         room: (n,) what the motors give, N·m; inf where they are not asked.
+        distances: Distances that may shrink only so fast; None for none.
         lower: (n,) least accelerations, rad/s².
         upper: (n,) largest accelerations, rad/s².
     """
@@ -32,6 +34,7 @@ class Bounds:
     M: np.ndarray
     bias: np.ndarray
     room: np.ndarray
+    distances: DistanceTerms | None = None
     lower: np.ndarray = field(init=False)
     upper: np.ndarray = field(init=False)
 
@@ -77,7 +80,17 @@ class Bounds:
     def broken(self, tau: np.ndarray, acceleration: np.ndarray) -> bool:
         """Tell whether a torque or its acceleration is outside."""
         above = np.any(np.abs(tau) > self.room * (1.0 + BROKEN))
-        return bool(above) or excess(acceleration, self.lower, self.upper) > BROKEN
+        joints = excess(acceleration, self.lower, self.upper) > BROKEN
+        return bool(above) or joints or self.approach(acceleration) > BROKEN
+
+    def approach(self, acceleration: np.ndarray) -> float:
+        """Tell by how much distances shrink faster than they may, as `opspace.law.excess` does."""
+        if self.distances is None:
+            return -np.inf
+        return excess_of_rows(acceleration, self.distances.G, self.distances.most)
+
+
+NOTHING = np.zeros(0)
 
 
 class Kept(NamedTuple):
@@ -88,6 +101,7 @@ class Kept(NamedTuple):
         status: What happened.
         limits: By name how much each joint limit acts: the acceleration that it takes from its joint,
             as a part of its margin, at most 1.
+        taken: What each distance takes from how fast it shrinks, (rows,) m/s².
         contacts: What each contact carries.
         hindrance: What contacts could not carry, as a multiple of what a contact that leaves may cost.
     """
@@ -95,12 +109,13 @@ class Kept(NamedTuple):
     tau: np.ndarray
     status: Status = Status.OK
     limits: Mapping[str, float] = MappingProxyType({})
+    taken: np.ndarray = NOTHING
     contacts: Mapping[str, ContactStatus] = NO_CONTACTS
     hindrance: float = 0.0
 
 
 def realise(bounds: Bounds, tau: np.ndarray, metric: Callable[[], np.ndarray]) -> Kept:
-    """Replace a torque by the nearest one with which no joint and no motor does more than it may.
+    """Replace a torque by the nearest one with which no joint, motor or distance does more than it may.
 
     Args:
         bounds: What they may.
@@ -112,8 +127,11 @@ def realise(bounds: Bounds, tau: np.ndarray, metric: Callable[[], np.ndarray]) -
     """
     M, bias = bounds.M, bounds.bias
     acceleration = np.linalg.solve(M, tau - bias)
+    near = bounds.distances
     if not bounds.broken(tau, acceleration):
-        return Kept(tau, Status.LIMIT_LOST if bounds.lost(acceleration) else Status.OK)
+        nothing = np.zeros(0 if near is None else near.most.size)
+        lost = Status.LIMIT_LOST if bounds.lost(acceleration) else Status.OK
+        return Kept(tau, lost, taken=nothing)
     found = nearest_acceleration(
         np.linalg.cholesky(M),
         metric(),
@@ -122,6 +140,8 @@ def realise(bounds: Bounds, tau: np.ndarray, metric: Callable[[], np.ndarray]) -
         bounds.upper,
         -bounds.room - bias,
         bounds.room - bias,
+        None if near is None else near.G,
+        None if near is None else near.most,
     )
     tau = np.clip(M @ found.acceleration + bias, -bounds.room, bounds.room)
     status = Status.FILTERED
@@ -129,7 +149,12 @@ def realise(bounds: Bounds, tau: np.ndarray, metric: Callable[[], np.ndarray]) -
         status |= Status.TORQUE_SCALED
     if bounds.lost(found.acceleration):
         status |= Status.LIMIT_LOST
-    return Kept(tau, status, acting(bounds.terms, found.upper, found.lower))
+    if np.any(found.rows > 0.0):
+        status |= Status.COLLISION
+    if bounds.approach(found.acceleration) > LOST:
+        status |= Status.COLLISION_LOST
+    limits = acting(bounds.terms, found.upper, found.lower)
+    return Kept(tau, status, limits, found.rows)
 
 
 def change_within_tick(
@@ -139,7 +164,7 @@ def change_within_tick(
 
     Args:
         robot: The robot at the beginning; it is there again in the end.
-        tau: (n,) torque, N·m.
+        tau: (n,) torque without what the world answers, N·m.
         acceleration: (n,) q̈ at the beginning, rad/s².
         period: Δt, s.
 

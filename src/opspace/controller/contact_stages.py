@@ -47,7 +47,7 @@ NOTICED, FALLING = 1e-3, 0.3
 """Parts of the weight from which a wrench counts as given up, and from which the robot falls."""
 
 
-class Touch(NamedTuple):
+class Footing(NamedTuple):
     """A contact in one tick.
 
     Attributes:
@@ -63,17 +63,17 @@ class Touch(NamedTuple):
     force: float
 
 
-def evaluate_contacts(k: Given) -> list[Touch]:
+def evaluate_contacts(k: Given) -> list[Footing]:
     """J, γ, h_m and h_f of every contact."""
-    found: list[Touch] = []
+    found: list[Footing] = []
     for member in k.contacts:
         contact = member.contact
         own = checked_activation(f"contact {contact.name!r}", contact.activation, k.robot, k.t)
-        found.append(Touch(member, contact.evaluate(k.robot), *member.activations(own)))
+        found.append(Footing(member, contact.evaluate(k.robot), *member.activations(own)))
     return found
 
 
-def contact_task_sets(touches: Sequence[Touch]) -> list[TaskSet]:
+def contact_task_sets(touches: Sequence[Footing]) -> list[TaskSet]:
     """J q̈ = γ of the contacts whose motion is there, above everything."""
     return [
         TaskSet(
@@ -93,7 +93,7 @@ def stand(
     k: Given,
     L: np.ndarray,
     limits: Sequence[LimitTerms],
-    touches: Sequence[Touch],
+    touches: Sequence[Footing],
     W: np.ndarray,
     gamma: np.ndarray,
 ) -> Kept:
@@ -133,10 +133,10 @@ def stand(
         status |= Status.LIMIT_LOST
     names = acting(bounds.terms, found.upper, found.lower)
     told = _told(touches, sets, found.forces)
-    return Kept(found.tau, status, names, told, lost / MAY_GIVE_UP)
+    return Kept(found.tau, status, names, contacts=told, hindrance=lost / MAY_GIVE_UP)
 
 
-def entering(touches: Sequence[Touch], L: np.ndarray) -> np.ndarray:
+def entering(touches: Sequence[Footing], L: np.ndarray) -> np.ndarray:
     """Hold contacts on their way in the metric, the harder the nearer they are to closed."""
     W = np.zeros(L.shape)
     for touch in touches:
@@ -152,7 +152,7 @@ def _size(wrench: np.ndarray) -> float:
     return max(float(np.linalg.norm(wrench[:3])), float(np.linalg.norm(wrench[3:])) / LEVER)
 
 
-def _status(found: Realised, lost: float, touches: Sequence[Touch]) -> Status:
+def _status(found: Realised, lost: float, touches: Sequence[Footing]) -> Status:
     status = Status.OK
     if found.projected:
         status |= Status.FILTERED
@@ -168,7 +168,7 @@ def _status(found: Realised, lost: float, touches: Sequence[Touch]) -> Status:
 
 
 def _told(
-    touches: Sequence[Touch], sets: Sequence[ForceSet], forces: Sequence[np.ndarray]
+    touches: Sequence[Footing], sets: Sequence[ForceSet], forces: Sequence[np.ndarray]
 ) -> dict[str, ContactStatus]:
     """Tell about every contact, those that carry nothing included."""
     left = iter(forces)
@@ -180,7 +180,7 @@ def _told(
     }
 
 
-def contact_status(touch: Touch, one: ForceSet, force: np.ndarray) -> ContactStatus:
+def contact_status(touch: Footing, one: ForceSet, force: np.ndarray) -> ContactStatus:
     """Tell about one contact."""
     pressed, axes = float(force[NORMAL]), touch.terms.axes
     sole = isinstance(touch.member.contact, SoleContact)

@@ -16,6 +16,7 @@ from opspace.controller.disturbance import DisturbanceObserver
 from opspace.controller.reference import ReferenceController
 from opspace.controller.stages import sum_of_hard_torques
 from opspace.controller.watchdog import Watchdog
+from opspace.controller.wrenches import Wrenches
 from opspace.errors import InputError
 from opspace.kernels.columns import (
     DAMPING,
@@ -46,7 +47,16 @@ from opspace.stack import Blending, Member, Outlook, variables_of
 from opspace.tasks.task import CHANGES
 from opspace.tasks.validation import finite, numbers
 
-STATUSES = tuple(map(Status, range(SOLVE)))
+
+class _Statuses(dict[int, Status]):
+    """Flags by their number; making one costs more than a tick, making all of them a second."""
+
+    def __missing__(self, bits: int) -> Status:
+        found = self[bits] = Status(bits)
+        return found
+
+
+STATUSES = _Statuses()
 NEW = tuple.__new__
 KEPT = 32
 """Plans that are kept for stacks to come again."""
@@ -90,14 +100,16 @@ class Controller(ReferenceController):
     _ready: Mapping[tuple[object, ...], Plan] = MappingProxyType({})
     _ahead: Mapping[int, tuple[Heritage, _LaidOut]] = MappingProxyType({})
 
-    def step(self, t: float, q: ArrayLike, v: ArrayLike) -> Command:  # noqa: PLR0912 - one piece is fast
+    def step(  # noqa: PLR0912 - one piece is fast
+        self, t: float, q: ArrayLike, v: ArrayLike, *, wrenches: Wrenches | None = None
+    ) -> Command:
         """Compute the torque for one state; see `ReferenceController.step`."""
         fixed = self._fixed
         if fixed is None:
             self.warm_up()
             fixed = self._fixed
             if fixed is None:
-                return super().step(t, q, v)
+                return super().step(t, q, v, wrenches=wrenches)
         robot, place, catch_up, watch, begin_tick, observer, tick = fixed
         if type(t) is not float or not isfinite(t):
             t = finite(t, "time")
@@ -119,6 +131,8 @@ class Controller(ReferenceController):
                 self._begin_anew()
                 return self._hold(t, STATUSES[timing])
         members = begin_tick(t)
+        if wrenches is not None or self._forces is not None:
+            timing |= int(self._sensed(t, wrenches, members))
         laid_out = self._laid_out
         if laid_out is None or members is not laid_out[0]:
             laid_out = self._lay_out(members)
@@ -128,6 +142,8 @@ class Controller(ReferenceController):
                 return self._answer(t, members, STATUSES[timing])
         _, plan, address, torque, memory = laid_out
         if plan.moving or CHANGES.last is not plan.seen:
+            if plan.distances is not None and not self._watches_all(plan):
+                _, plan, address, torque, memory = self._lay_out_anew(members)
             plan.refresh(robot, t)
         answer = tick(t, address) if observer is None else self._learn(t, observer)
         if answer < 0:
@@ -209,7 +225,8 @@ class Controller(ReferenceController):
         check_members(members)
         batch = self._batch
         threads = threads or cores()
-        if batch is None or batch.members is not members or batch.threads != threads:
+        same = batch is not None and batch.members is members and batch.threads == threads
+        if batch is None or not same or not self._watches_all(batch.plan):
             batch = self._batch = self._batched(members, threads)
         if self._observer is not None:
             batch.disturb(self._observer.acceleration)
@@ -296,7 +313,9 @@ class Controller(ReferenceController):
             copies, plan = outlook.copies, None
             if Plan.fits(copies):
                 key = structure(copies)
-                plan = ready.get(key) or known.get(key) or self._planned(copies, axes)
+                plan = ready.get(key) or known.get(key)
+                if plan is None or not self._watches_all(plan):
+                    plan = self._planned(copies, axes)
                 ready[key] = plan
                 if before is not None and last is not None:
                     ramps = tuple(variable.ramp for variable in variables_of(copies))
@@ -311,7 +330,7 @@ class Controller(ReferenceController):
     def _lay_out(self, members: tuple[Member, ...]) -> _LaidOut | None:
         """Take up the plan for these tasks, or None where there are too many of them."""
         found = self._ahead.get(id(members))
-        if found is None or not found[0].holds(self._plan):
+        if found is None or not found[0].holds(self._plan) or not self._watches_all(found[1][1]):
             found = self._laid_out_now(members)
             if found is None:
                 return None
@@ -329,7 +348,7 @@ class Controller(ReferenceController):
         assert self._axes is not None
         before, key = self._plan, structure(members)
         plan = before if before is not None and before.structure == key else self._ready.get(key)
-        if plan is None:
+        if plan is None or not self._watches_all(plan):
             if not Plan.fits(members):
                 return None
             plan = self._planned(members, self._axes)
@@ -353,7 +372,20 @@ class Controller(ReferenceController):
             self.robot.torque_limit,
             self._options(),
             self._blending,
+            self._collisions,
         )
+
+    def _watches_all(self, plan: Plan) -> bool:
+        """Tell whether a plan knows of all obstacles that there are now."""
+        if self._collisions is None or plan.distances is None:
+            return True
+        return plan.distances.layout is self._collisions.layout()
+
+    def _lay_out_anew(self, members: tuple[Member, ...]) -> _LaidOut:
+        """Go on with the same tasks and other obstacles."""
+        laid_out = self._lay_out(members)
+        assert laid_out is not None
+        return laid_out
 
     def _options(self) -> np.ndarray:
         option = np.zeros(OPTION_SIZE)

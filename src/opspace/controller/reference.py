@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from opspace.command import Command, Found, Status
-from opspace.contacts import Contact
+from opspace.contacts import GroundContact
 from opspace.controller.changing_payload import Loading
 from opspace.controller.disturbance import DisturbanceObserver
 from opspace.controller.drivable import base_of, check_drivable
@@ -18,6 +18,7 @@ from opspace.controller.integral import IntegralAction
 from opspace.controller.rates import check_damping, check_limits, with_period
 from opspace.controller.stages import Given, Law, Rules, sum_of_hard_torques, tick
 from opspace.controller.watchdog import Watchdog
+from opspace.controller.wrenches import Wrenches, WrenchInput
 from opspace.errors import InputError, unknown_name
 from opspace.law import Profile
 from opspace.plan.scales import DEFAULT_SINGULARITY, Scales, Singularity
@@ -25,7 +26,7 @@ from opspace.robots.adapter import AdapterBase
 from opspace.robots.payload import Payload
 from opspace.robots.protocol import Robot
 from opspace.stack import Blending, Member, Stack
-from opspace.tasks import JointLimits, Task, TrackingTask
+from opspace.tasks import CollisionAvoidance, ForceTask, JointLimits, Task, TrackingTask
 from opspace.tasks.validation import finite, numbers
 
 BIASES = ("joint", "task")
@@ -72,6 +73,7 @@ class ReferenceController:
             does nothing of it.
         on_time_jump: What happens when time runs backwards or jumps, see
             `opspace.controller.watchdog.POLICIES`; it needs ``period``.
+        collisions: What is kept apart: the robot's own links, and obstacles; None for nothing.
         law: Torque of task sets, to compare with the library's own; see
             `opspace.controller.stages.Question` for what it is asked.
 
@@ -94,6 +96,7 @@ class ReferenceController:
         torque_limits: str = "report",
         period: float | None = None,
         on_time_jump: str = "report",
+        collisions: CollisionAvoidance | None = None,
         law: Law = sum_of_hard_torques,
     ) -> None:
         self._blending = blending if isinstance(blending, Blending) else Blending(blending)
@@ -116,13 +119,7 @@ class ReferenceController:
         check_drivable(robot)
         self._base = base_of(robot)
         if self._base:
-            if bias != "joint" or gravity != "controller":
-                raise InputError(
-                    f"robot {robot.name!r} has a floating base: nothing holds its weight but contacts, "
-                    "so it takes bias='joint' and gravity='controller'"
-                )
-            if singularity is DEFAULT_SINGULARITY:
-                singularity = None
+            singularity = _singularity_of_base(robot, bias, gravity, collisions, singularity)
         if stack.limits is not None:
             Profile(stack.limits.profile)
         self._robot, self._stack = robot, stack
@@ -137,15 +134,18 @@ class ReferenceController:
         self._timing = None if period is None else Watchdog(period, on_time_jump)
         self._scales = Scales(robot, singularity)
         self._integral: IntegralAction | None = None
+        self._forces: WrenchInput | None = None
         stack.attach(self._prepared if period is None else self._paced(period))
         self.calibration = self._scales.calibration(list(stack))
         if stack.limits is not None:
             stack.limits.bind(robot, self.calibration.brake)
         stack.attach_contacts(self._touching)
+        _bind_collisions(collisions, robot)
+        self._collisions = collisions
         self._handover: Handover | None = None
         self._last_torque: np.ndarray | None = None
         self._loading: Loading | None = None
-        self._plain = not self._robot_adds and self._integral is None
+        self._plain = self._needs_no_more()
         self._observer = _observer(stack.limits, robot.nv, torque_limits)
         self._rules = Rules(
             law,
@@ -157,9 +157,10 @@ class ReferenceController:
             stack.limits,
             self._observer,
             0.0 if period is None else float(period),
+            collisions,
         )
 
-    def _touching(self, contact: Contact) -> None:
+    def _touching(self, contact: GroundContact) -> None:
         """Get a contact ready.
 
         Raises:
@@ -184,6 +185,11 @@ class ReferenceController:
         self._scales.prepare(task)
         if self._integral is None and isinstance(task, TrackingTask) and task.ki is not None:
             self._integral = IntegralAction(self._robot, self._scales)
+            self._plain = False
+        if isinstance(task, ForceTask):
+            if self._forces is None:
+                self._forces = WrenchInput(self._robot)
+            self._forces.add(task)
             self._plain = False
 
     def __repr__(self) -> str:
@@ -285,10 +291,22 @@ class ReferenceController:
             )
         return found
 
+    def _needs_no_more(self) -> bool:
+        """Tell whether a command leaves as the tick has made it."""
+        return not self._robot_adds and self._integral is None and self._forces is None
+
+    def _sensed(self, t: float, wrenches: Wrenches | None, members: Sequence[Member]) -> Status:
+        """Hand the wrenches of a tick to the tasks that need them."""
+        if self._forces is None:
+            self._forces = WrenchInput(self._robot)
+        return self._forces.take(t, wrenches, members)
+
     def _finished(self, command: Command, members: Sequence[Member]) -> Command:
         """Learn from a tick, leave out what the robot adds, mix with another's torque in a handover."""
         if self._handover is None and self._integral is not None:
             self._integral.after(command, members)
+        if self._forces is not None:
+            self._forces.after(command)
         added, handover = self._added_by_robot(), self._handover
         if handover is None:
             return command._replace(tau=command.tau - added) if self._robot_adds else command
@@ -297,7 +315,7 @@ class ReferenceController:
         tau = handover.torque(command.t, command.tau - added, self.robot.torque_limit, added)
         if handover.done:
             self._handover = None
-            self._plain = not self._robot_adds and self._integral is None
+            self._plain = self._needs_no_more()
         return command._replace(tau=tau, status=command.status | Status.HANDOVER)
 
     def _added_by_robot(self) -> np.ndarray:
@@ -317,24 +335,40 @@ class ReferenceController:
         return self._stack
 
     @property
+    def collisions(self) -> CollisionAvoidance | None:
+        """What it keeps apart; obstacles come, go and move in it, it stays."""
+        return self._collisions
+
+    @property
     def blending(self) -> str:
         """Name of the blending."""
         return self._blending.name
 
-    def step(self, t: float, q: ArrayLike, v: ArrayLike) -> Command:
+    @property
+    def wrenches(self) -> Mapping[str, np.ndarray | None]:
+        """Wrenches that the last tick was given, (6,) N and N·m; None where nothing was new."""
+        return {} if self._forces is None else self._forces.given
+
+    def step(
+        self, t: float, q: ArrayLike, v: ArrayLike, *, wrenches: Wrenches | None = None
+    ) -> Command:
         """Compute the torque for one state.
 
         Args:
             t: Time, s.
             q: Configuration, (nq,).
             v: Velocity, (n,), rad/s.
+            wrenches: Wrench that the robot exerts on the environment, (6,) N and N·m in world axes at
+                the point of the task, by name of the frame; None in place of one where nothing new
+                has been measured. Only force tasks need them.
 
         Returns:
             The command; its torque is finite.
 
         Raises:
             InputError: The state has a wrong size or is not finite, or a reference or activation
-                gave unusable numbers; no torque has been computed.
+                gave unusable numbers; a force task lacks its wrench; no torque has been computed.
+            UnknownNameError: A wrench of a frame that the robot does not have.
         """
         t = finite(t, "time")
         robot = self.robot
@@ -345,14 +379,27 @@ class ReferenceController:
         if timing & Status.TIME_JUMP and self._holds:
             self._begin_anew()
             return self._hold(t, timing)
-        return self._answer(t, self.stack.begin_tick(t), timing)
+        members = self.stack.begin_tick(t)
+        if wrenches is not None or self._forces is not None:
+            timing |= self._sensed(t, wrenches, members)
+        return self._answer(t, members, timing)
 
     def _answer(self, t: float, members: Sequence[Member], timing: Status) -> Command:
         """Compute the torque of these tasks for the robot's present state."""
         r = self.robot
         touching = self.stack.begin_contacts(t) if self._base else ()
         given = Given(
-            self._rules, t, members, r, r.q, r.v, r.M, r.bias, r.torque_limit, self._base, touching
+            self._rules,
+            t,
+            members,
+            r,
+            r.q,
+            r.v,
+            r.M,
+            r.bias,
+            r.torque_limit,
+            base=self._base,
+            contacts=touching,
         )
         answer = tick(given)
         if answer is None:
@@ -388,6 +435,34 @@ class ReferenceController:
         limit = np.minimum(robot.torque_limit, np.finfo(float).max)
         limit[: self._base] = 0.0
         return np.clip(np.nan_to_num(tau, nan=0.0), -limit, limit)
+
+
+def _singularity_of_base(
+    robot: Robot,
+    bias: str,
+    gravity: str,
+    collisions: CollisionAvoidance | None,
+    singularity: Singularity | None,
+) -> Singularity | None:
+    """Refuse what does not go with a floating base, and tell what stands for the default buffer."""
+    if bias != "joint" or gravity != "controller":
+        raise InputError(
+            f"robot {robot.name!r} has a floating base: nothing holds its weight but contacts, "
+            "so it takes bias='joint' and gravity='controller'"
+        )
+    if collisions is not None:
+        raise InputError(
+            f"robot {robot.name!r} has a floating base, whose controller does not keep distances yet"
+        )
+    return None if singularity is DEFAULT_SINGULARITY else singularity
+
+
+def _bind_collisions(collisions: CollisionAvoidance | None, robot: Robot) -> None:
+    if collisions is None:
+        return
+    if not isinstance(collisions, CollisionAvoidance):
+        raise InputError(f"collisions takes a CollisionAvoidance, not {type(collisions).__name__}")
+    collisions.bind(robot)
 
 
 def _observer(limits: JointLimits | None, n: int, torque_limits: str) -> DisturbanceObserver | None:

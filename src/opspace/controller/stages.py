@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 
 from opspace.command import Found, Status
 from opspace.controller.bounds import Bounds, Kept, change_within_tick, realise
+from opspace.controller.collisions import DistanceTerms, distance_terms
 from opspace.controller.contact_stages import (
-    Touch,
+    Footing,
     contact_task_sets,
     evaluate_contacts,
     stand,
@@ -39,12 +40,14 @@ from opspace.law import (
     whiten,
 )
 from opspace.law.blending import combined
-from opspace.law.scalars import SCALED
+from opspace.law.scalars import SCALED, room_for
 from opspace.plan.scales import Scales
 from opspace.robots.protocol import Robot
 from opspace.stack import Blending, ContactMember, Member, Mixture, mixture, presences
 from opspace.tasks import JointLimits, PostureTask, TaskTerms, TrackingTask
 from opspace.tasks.activations import own_activation
+from opspace.tasks.collision_avoidance import CollisionAvoidance
+from opspace.tasks.validation import shown
 
 REST = ""
 """Name of the damping of what no task uses; tasks have names."""
@@ -99,6 +102,7 @@ class Rules:
         limits: Joint limits, None for none.
         observer: Of what the model does not explain; None trusts the model.
         period: Time between two ticks, in which accelerations change, s; 0 where it is not known.
+        guard: What is kept apart, None for nothing.
     """
 
     law: Law
@@ -110,6 +114,7 @@ class Rules:
     limits: JointLimits | None
     observer: DisturbanceObserver | None
     period: float
+    guard: CollisionAvoidance | None = None
 
 
 @dataclass(frozen=True)
@@ -124,8 +129,10 @@ class Given:
         q: Configuration, (nq,).
         v: (n,) velocity, rad/s.
         M: (n, n) inertia.
-        bias: (n,) Coriolis, centrifugal and gravity torque, N·m.
+        bias: (n,) Coriolis, centrifugal and gravity torque, N·m, with the reaction from `balance` on.
         torque_limit: (n,) what the motors give, N·m.
+        reaction: (n,) what tasks expect of the world, N·m; None for nothing.
+        part: How much of it the motors can give.
         base: Number of the first coordinates without a motor, those of a floating base.
         contacts: What a robot with such a base touches.
     """
@@ -139,6 +146,8 @@ class Given:
     M: np.ndarray
     bias: np.ndarray
     torque_limit: np.ndarray
+    reaction: np.ndarray | None = None
+    part: float = 1.0
     base: int = 0
     contacts: Sequence[ContactMember] = ()
 
@@ -171,6 +180,7 @@ def tick(k: Given) -> Answer | None:
     """
     h = activations(k)
     terms = evaluate_tasks(k)
+    k = balance(k, h, terms)
     mixed = blend(k, h)
     L = factor(k, terms)
     if L is None:
@@ -182,16 +192,18 @@ def tick(k: Given) -> Answer | None:
     above = on_the_ground(k, touches, limit_corners(k, limits, inserted))
     try:
         gamma, info = law(k, L, mixed, tasks, above)
+        distances = measure_distances(k)
         if k.base:
             kept = stand(k, L, limits, touches, metric(L, tasks), gamma)
         else:
-            kept = keep_bounds(k, L, limits, tasks, torque(k, gamma))
+            kept = keep_bounds(k, L, limits, distances, tasks, torque(k, gamma))
     except (InputError, np.linalg.LinAlgError):
         # Everything that went in is finite: these numbers are too large to compute with.
         return None
     active = {limits[i].side.name: limit for i, limit in inserted.items()} | dict(kept.limits)
     levels = level_status(k.members, mixed, info, len(above.task_sets))
-    found = Found(task_status(k.members, h, terms, mixed), levels, active, kept.contacts)
+    apart = {} if distances is None else distances.layout.status(distances.distance, kept.taken)
+    found = Found(task_status(k.members, h, terms, mixed), levels, active, apart, kept.contacts)
     happened = status(k, kept.tau, info, found) | kept.status
     return Answer(kept.tau, happened, info.hard_solves, found, kept.hindrance)
 
@@ -210,6 +222,40 @@ def activations(k: Given) -> list[float]:
 def evaluate_tasks(k: Given) -> list[TaskTerms]:
     """J, J̇ q̇ and f* of every task (Eq. 24)."""
     return [member.task.evaluate(k.robot, k.t) for member in k.members]
+
+
+def balance(k: Given, h: Sequence[float], terms: Sequence[TaskTerms]) -> Given:
+    """Count s Σ h_k g_k as bias, with s as far as the motors can give it.
+
+    The weights of the stacks that have task k sum to h_k, so this is what the blend of stacks that
+    each carry the torques of their own tasks comes to.
+
+    Raises:
+        InputError: A task of the user's own gave an unusable torque.
+    """
+    carried = [
+        activation * _balanced(k, member, term.torque)
+        for member, activation, term in zip(k.members, h, terms, strict=True)
+        if term.torque is not None
+    ]
+    if not carried:
+        return k
+    reaction = np.add.reduce(carried)
+    part = 1.0
+    if k.rules.keep_torque and k.rules.bias == "joint":
+        part = room_for(reaction, start_inside(k), k.torque_limit)
+        reaction = part * reaction
+    return replace(k, bias=k.bias + reaction, reaction=reaction, part=part)
+
+
+def _balanced(k: Given, member: Member, torque: np.ndarray) -> np.ndarray:
+    found = np.asarray(torque, dtype=float)
+    if found.shape != k.v.shape or not np.all(np.isfinite(found)):
+        raise InputError(
+            f"task {member.task.name!r}: its balanced torque at t = {k.t:.6g} s must be finite, of "
+            f"shape {k.v.shape}, got {shown(torque)}"
+        )
+    return found
 
 
 def blend(k: Given, h: Sequence[float]) -> Mixture:
@@ -321,7 +367,7 @@ def limit_corners(k: Given, limits: Sequence[LimitTerms], inserted: Mapping[int,
     return Blend(sets, corners([task.activation for task in sets], "chain"))
 
 
-def on_the_ground(k: Given, touches: Sequence[Touch], limits: Blend) -> Blend:
+def on_the_ground(k: Given, touches: Sequence[Footing], limits: Blend) -> Blend:
     """Put what contacts hold above the joint limits."""
     sets = contact_task_sets(touches)
     if not sets:
@@ -339,20 +385,32 @@ def torque(k: Given, gamma: np.ndarray) -> np.ndarray:
     return gamma if k.rules.bias == "task" else gamma + k.bias
 
 
+def measure_distances(k: Given) -> DistanceTerms | None:
+    """How far bodies are apart that must not touch, and how fast each distance may shrink."""
+    guard = k.rules.guard
+    return None if guard is None else distance_terms(guard, k.robot, k.t)
+
+
 def keep_bounds(
-    k: Given, L: np.ndarray, limits: Sequence[LimitTerms], tasks: Blend, tau: np.ndarray
+    k: Given,
+    L: np.ndarray,
+    limits: Sequence[LimitTerms],
+    distances: DistanceTerms | None,
+    tasks: Blend,
+    tau: np.ndarray,
 ) -> Kept:
-    """Take the nearest torque with which no joint and no motor does more than it may."""
+    """Take the nearest torque with which no joint, motor or distance does more than it may."""
     rules, observer = k.rules, k.rules.observer
     kept = Kept(tau)
     keeps = limits if rules.limits is not None and rules.limits.law.bound else []
-    if keeps or rules.keep_torque:
+    if keeps or rules.keep_torque or distances is not None:
         room = k.torque_limit if rules.keep_torque else np.full(k.v.size, np.inf)
-        bounds = Bounds(keeps, k.M, k.bias, room)
+        bounds = Bounds(keeps, k.M, k.bias, room, distances)
         kept = realise(bounds, tau, lambda: metric(L, tasks))
         acceleration = np.linalg.solve(k.M, kept.tau - k.bias)
         if rules.period > 0.0 and k.q.size == k.v.size and bounds.near(acceleration):
-            change = change_within_tick(k.robot, kept.tau, acceleration, rules.period)
+            own = kept.tau if k.reaction is None else kept.tau - k.reaction
+            change = change_within_tick(k.robot, own, acceleration, rules.period)
             kept = realise(bounds.after(change), tau, lambda: metric(L, tasks))
     if observer is not None:
         observer.remember(k.t, k.v, np.linalg.solve(k.M, kept.tau - k.bias))
@@ -378,7 +436,7 @@ def status(k: Given, tau: np.ndarray, info: LawInfo, found: Found) -> Status:
         bits |= Status.ABOVE_TORQUE_LIMIT
     if found.limits:
         bits |= Status.JOINT_LIMIT
-    if any(level.scale < 1.0 - SCALED for level in info.levels):
+    if k.part < 1.0 - SCALED or any(level.scale < 1.0 - SCALED for level in info.levels):
         bits |= Status.TORQUE_SCALED
     if any(np.any(level.activation < 1.0) for level in found.levels):
         bits |= Status.DIRECTION_OFF

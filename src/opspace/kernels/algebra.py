@@ -21,18 +21,30 @@ def cholesky(A, n, shift, L):
         otherwise L is not usable.
     """
     for i in range(n):
-        for j in range(i + 1):
-            s = A[i, j]
-            if i == j:
-                s -= shift
-            for k in range(j):
-                s -= L[i, k] * L[j, k]
-            if i == j:
-                if not s > 0.0:
-                    return False
-                L[i, i] = 1.0 / math.sqrt(s)
-            else:
-                L[i, j] = s * L[j, j]
+        if not cholesky_row(A, i, shift, L):
+            return False
+    return True
+
+
+@jit
+def cholesky_row(A, i, shift, L):
+    """Factor row i of `cholesky` where the rows before it are.
+
+    Returns:
+        Whether the matrix is positive definite so far.
+    """
+    for j in range(i + 1):
+        s = A[i, j]
+        if i == j:
+            s -= shift
+        for k in range(j):
+            s -= L[i, k] * L[j, k]
+        if i == j:
+            if not s > 0.0:
+                return False
+            L[i, i] = 1.0 / math.sqrt(s)
+        else:
+            L[i, j] = s * L[j, j]
     return True
 
 

@@ -26,8 +26,9 @@ POSITION, ORIENTATION, POSE = range(3)
     SPEED_LIMITED,
     COVERS_ALL,
     REMEMBERS,
-) = range(13)
-KIND_SIZE = 13
+    CARRIES,
+) = range(14)
+KIND_SIZE = 14
 
 # Columns of Tick.numbers: a task as numbers. Rotations are by rows, placements by columns.
 LOCAL = 0
@@ -75,7 +76,7 @@ OPTION_SIZE = 20
 
 # What a tick answers when there is no torque.
 STATE_NOT_FINITE, NOT_FINITE, NOT_POSITIVE_DEFINITE = -1, -2, -3
-SOLVE = 2 * int(Status.HANDOVER)
+SOLVE = 2 * int(Status.COLLISION_LOST)
 """What a hard torque counts in its answer, above every combination of statuses without contacts."""
 
 

@@ -22,6 +22,7 @@ from opspace.kernels.compiled_scalars import (
     limit_presence,
     stopping_command,
 )
+from opspace.kernels.distances import approach
 from opspace.kernels.dynamics import evaluate
 from opspace.kernels.inertia import acceleration_of, factor, whiten
 from opspace.kernels.limit_columns import (
@@ -42,6 +43,8 @@ from opspace.machine.jit import jit
 
 FILTERED = int(Status.FILTERED)
 LIMIT_LOST = int(Status.LIMIT_LOST)
+COLLISION = int(Status.COLLISION)
+COLLISION_LOST = int(Status.COLLISION_LOST)
 SCALED = int(Status.TORQUE_SCALED)
 
 
@@ -83,7 +86,7 @@ def stop(work, limit, j):
     most = math.inf
     for a in range(work.v.shape[0]):
         if work.M[a, j] != 0.0:
-            room = max(work.torque_limit[a] - abs(work.bias[a]), 0.0)
+            room = max(work.torque_limit[a] - abs(work.balance[a]), 0.0)
             most = min(most, room / abs(work.M[a, j]))
     command = stopping_command(d, towards, limit[BRAKE], most, k1, period)
     if command < limit[COMMAND]:
@@ -118,10 +121,10 @@ def insert_limits(work):
 
 @jit
 def keep_bounds(work, stacks):
-    """Take the nearest torque with which no joint and no motor does more than it may.
+    """Take the nearest torque with which no joint, motor or distance does more than it may.
 
     Reads and writes tau (n,), N·m, and joint_acceleration (n,), rad/s²; writes limit_h (limits,) of the
-    limits that act.
+    limits that act, and distance_taken (distances,) m/s².
 
     Args:
         work: `opspace.plan.records.TICK`.
@@ -130,12 +133,13 @@ def keep_bounds(work, stacks):
     Returns:
         What happened, in the numbers of `opspace.Status`.
     """
-    if work.option[LIMIT_BOUND] == 0.0 and work.option[KEEP_TORQUE] == 0.0:
+    apart = work.distance.shape[0]
+    if work.option[LIMIT_BOUND] == 0.0 and work.option[KEEP_TORQUE] == 0.0 and apart == 0:
         return 0
     n = work.v.shape[0]
     x = work.joint_acceleration
     for a in range(n):
-        x[a] = work.tau[a] - work.bias[a]
+        x[a] = work.tau[a] - work.balance[a]
     whiten(work.inertia, x)
     acceleration_of(work.inertia, x)
     for a in range(n):
@@ -161,13 +165,16 @@ def realise(work, stacks, n):
         What happened, in the numbers of `opspace.Status`.
     """
     _bounds(work, n)
-    if not (_motors_exceeded(work, n) or _excess(work, n) > BROKEN):
+    for i in range(work.distance_taken.shape[0]):
+        work.distance_taken[i] = 0.0
+    outside = _motors_exceeded(work, n) or _excess(work, n) > BROKEN
+    if not (outside or approach(work) > BROKEN):
         return LIMIT_LOST if _will_pass(work) else 0
     task_metric(work, stacks)
     x = work.joint_acceleration
-    nearest_acceleration(work.inertia, x, work.bounds)
+    nearest_acceleration(work.inertia, x, work.bounds, work.distances)
     for a in range(n):
-        work.tau[a] = work.bias[a]
+        work.tau[a] = work.balance[a]
         for b in range(n):
             work.tau[a] += work.M[a, b] * x[b]
         if work.option[KEEP_TORQUE] != 0.0:
@@ -188,6 +195,12 @@ def _acting(work, n):
     for a in range(2 * n, 4 * n):
         if taken[a] > 0.0:
             bits |= SCALED
+    for i in range(work.distance_taken.shape[0]):
+        work.distance_taken[i] = taken[4 * n + i]
+        if taken[4 * n + i] > 0.0:
+            bits |= COLLISION
+    if approach(work) > LOST:
+        bits |= COLLISION_LOST
     if _excess(work, n) > LOST or _will_pass(work):
         bits |= LIMIT_LOST
     return bits
@@ -245,8 +258,8 @@ def _bounds(work, n):
         bounds.lower[a], bounds.upper[a] = -math.inf, math.inf
         bounds.least[a], bounds.most[a] = -math.inf, math.inf
         if work.option[KEEP_TORQUE] != 0.0:
-            bounds.least[a] = -work.torque_limit[a] - work.bias[a]
-            bounds.most[a] = work.torque_limit[a] - work.bias[a]
+            bounds.least[a] = -work.torque_limit[a] - work.balance[a]
+            bounds.most[a] = work.torque_limit[a] - work.balance[a]
     if work.option[LIMIT_BOUND] == 0.0:
         return
     for i in range(work.limit.shape[0]):
@@ -285,7 +298,7 @@ def look_ahead(work, n):
     if not factor(work.later.M, work.later_inertia):
         return False
     for a in range(n):
-        change[a] = work.tau[a] - work.later.bias[a]
+        change[a] = work.tau[a] - work.reaction[a] - work.later.bias[a]
     whiten(work.later_inertia, change)
     acceleration_of(work.later_inertia, change)
     for i in range(work.limit.shape[0]):

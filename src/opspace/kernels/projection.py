@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 
-from opspace.kernels.algebra import cholesky, solve_lower, solve_lower_transposed
+from opspace.kernels.algebra import cholesky, cholesky_row, solve_lower, solve_lower_transposed
 from opspace.kernels.compiled_scalars import level_weight
-from opspace.kernels.inertia import acceleration_of, unit_row, whitened_of
+from opspace.kernels.distances import faster
+from opspace.kernels.inertia import acceleration_of, unit_row, whiten, whitened_of
 from opspace.kernels.walk import slot_bit
-from opspace.law.scalars import CLEANINGS, HARD, ROUNDING, SOFT, UNBOUNDED
+from opspace.law.scalars import BROKEN, CLEANINGS, HARD, ROUNDING, SOFT, UNBOUNDED
 from opspace.machine.jit import jit
 
 
@@ -43,26 +44,48 @@ def task_metric(work, stacks):
 
 
 @jit
-def nearest_acceleration(inertia, acceleration, bounds):
+def nearest_acceleration(inertia, acceleration, bounds, distances):
     """Overwrite an acceleration with the nearest one within bounds, in the metric bounds.W.
 
     The multipliers of the bounds are found by the active-set method of Lawson and Hanson. With
-    W = C Cᵀ the point is z = Cᵀ x, x = Uᵀ q̈.
+    W = C Cᵀ the point is z = Cᵀ x, x = Uᵀ q̈. Of the distances only those are projected on that would
+    shrink too fast without: the answer is the same, and the others cost a product each.
 
     Args:
         inertia: `INERTIA`, factored.
         acceleration: (n,) rad/s², overwritten.
         bounds: `BOUNDS`: W, lower and upper, rad/s², least and most, N·m, are read; C and taken written.
+        distances: `DISTANCES`: G and most are read.
     """
     n = acceleration.shape[0]
     cholesky(bounds.W, n, 0.0, bounds.C)
     count = _normals(inertia, n, bounds)
     whitened_of(inertia, acceleration, bounds.row)
     for a in range(n):
-        bounds.x[a] = bounds.row[a] / bounds.C[a, a]  # the factor's diagonal is inverted
+        bounds.z[a] = bounds.row[a] / bounds.C[a, a]  # the factor's diagonal is inverted
         for b in range(a + 1, n):
-            bounds.x[a] += bounds.C[b, a] * bounds.row[b]
-    for a in range(4 * n):
+            bounds.z[a] += bounds.C[b, a] * bounds.row[b]
+    for i in range(distances.held.shape[0]):
+        distances.held[i] = 0
+    count = _take_in(inertia, acceleration, count, n, bounds, distances)
+    while True:
+        _clean(count, n, bounds)
+        for a in range(n):
+            acceleration[a] = bounds.y[a]
+        solve_lower_transposed(bounds.C, n, acceleration)
+        acceleration_of(inertia, acceleration)
+        before = count
+        count = _take_in(inertia, acceleration, count, n, bounds, distances)
+        if count == before:
+            break
+
+
+@jit
+def _clean(count, n, bounds):
+    """Project z several times, what softness leaves of an excess included."""
+    for a in range(n):
+        bounds.x[a] = bounds.z[a]
+    for a in range(bounds.taken.shape[0]):
         bounds.taken[a] = 0.0
     for _ in range(CLEANINGS):
         _project(count, n, bounds)
@@ -70,10 +93,27 @@ def nearest_acceleration(inertia, acceleration, bounds):
             bounds.x[a] = bounds.y[a]
         for i in range(count):
             bounds.taken[bounds.owner[i]] += bounds.multiplier[i] * bounds.size[i]
-    for a in range(n):
-        acceleration[a] = bounds.y[a]
-    solve_lower_transposed(bounds.C, n, acceleration)
-    acceleration_of(inertia, acceleration)
+
+
+@jit
+def _take_in(inertia, acceleration, count, n, bounds, distances):
+    """Append the distances that shrink faster than they may, as unit normals.
+
+    Returns:
+        How many bounds there are then.
+    """
+    for i in range(distances.held.shape[0]):
+        most = distances.most[i]
+        over = faster(distances, i, acceleration) - most
+        if distances.held[i] != 0 or not over > -BROKEN * max(1.0, abs(most)):
+            continue
+        distances.held[i] = 1
+        for a in range(n):
+            bounds.row[a] = distances.G[i, a]
+        whiten(inertia, bounds.row)
+        # The second side is free.
+        count = _two_sided(count, n, 4 * n + i, -math.inf, most, SOFT, bounds)
+    return count
 
 
 @jit
@@ -102,6 +142,8 @@ def _two_sided(count, n, owner, least, most, softness, bounds):
     for a in range(n):
         size += bounds.row[a] * bounds.row[a]
     size = math.sqrt(size)
+    if size == 0.0:
+        return count
     for side in range(2):
         sign = 1.0 if side == 0 else -1.0
         limit = most if side == 0 else -least
@@ -127,12 +169,12 @@ def _project(count, n, bounds):
         if worst < 0:
             break
         bounds.active[size] = worst
-        size += 1
+        known, size = size, size + 1
         while size > 0:
-            _multipliers(n, size, bounds)
+            _multipliers(n, known, size, bounds)
             if _advance(size, bounds):
                 break
-            size = _drop(size, bounds)
+            known, size = 0, _drop(size, bounds)
         for a in range(n):
             bounds.y[a] = bounds.x[a]
             for k in range(size):
@@ -161,10 +203,15 @@ def _most_broken(count, n, size, bounds):
 
 
 @jit
-def _multipliers(n, size, bounds):
-    """Solve (N Nᵀ + softness) λ = N x − bound for the bounds that hold."""
+def _multipliers(n, known, size, bounds):
+    """Solve (N Nᵀ + softness) λ = N x − bound for the bounds that hold, of which some are factored."""
     for k in range(size):
         i = bounds.active[k]
+        bounds.r[k] = -bounds.bound[i]
+        for a in range(n):
+            bounds.r[k] += bounds.normal[i, a] * bounds.x[a]
+        if k < known:
+            continue
         for b in range(k + 1):
             j = bounds.active[b]
             product = 0.0
@@ -172,10 +219,7 @@ def _multipliers(n, size, bounds):
                 product += bounds.normal[i, a] * bounds.normal[j, a]
             bounds.G[k, b] = product
         bounds.G[k, k] += bounds.softness[i]
-        bounds.r[k] = -bounds.bound[i]
-        for a in range(n):
-            bounds.r[k] += bounds.normal[i, a] * bounds.x[a]
-    cholesky(bounds.G, size, 0.0, bounds.factor)
+        cholesky_row(bounds.G, k, 0.0, bounds.factor)
     solve_lower(bounds.factor, size, bounds.r)
     solve_lower_transposed(bounds.factor, size, bounds.r)
     for k in range(size):

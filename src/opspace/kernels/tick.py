@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from opspace.command import Status
+from opspace.kernels.balance import balance
 from opspace.kernels.columns import (
     COVERS_ALL,
     DAMPING,
@@ -30,6 +31,7 @@ from opspace.kernels.columns import (
 )
 from opspace.kernels.compiled_scalars import leaning, ramp
 from opspace.kernels.corners import corners, insert, sort_corners
+from opspace.kernels.distances import measure_distances
 from opspace.kernels.dynamics import evaluate
 from opspace.kernels.inertia import (
     factor,
@@ -72,6 +74,7 @@ def tick(t, work):
         evaluate(work.bodies, work.q, work.v, work.dynamics)
     activations(t, work)
     evaluate_tasks(work)
+    balance(work)
     if not factor(work.M, work.inertia):
         return NOT_POSITIVE_DEFINITE
     stacks = blend(work)
@@ -83,6 +86,7 @@ def tick(t, work):
             limit_stacks = limit_corners(work)
     law(work, stacks, limit_stacks)
     torque(work)
+    measure_distances(work)
     kept = keep_bounds(work, stacks)
     if not _finite(work.tau):
         return NOT_FINITE
@@ -182,7 +186,7 @@ def whiten_tasks(work):
     if work.option[TASK_BIAS] != 0.0:
         # Eq. 3-4: f̃ = f* + η + ζ, the bias as an acceleration of each task.
         for a in range(n):
-            work.drop[a] = work.bias[a]
+            work.drop[a] = work.balance[a]
         whiten(work.inertia, work.drop)
     covered = False
     for i in range(work.kind.shape[0]):
@@ -349,7 +353,7 @@ def torque(work):
         if work.option[KEEP_TORQUE] != 0.0:
             work.tau[a] += work.space.start[a]
         elif work.option[TASK_BIAS] == 0.0:
-            work.tau[a] += work.bias[a]
+            work.tau[a] += work.balance[a]
 
 
 @jit
@@ -357,7 +361,7 @@ def start_inside(work, n):
     """Begin with the bias where it is compensated at every joint, cut at the limits, (n,) N·m."""
     work.space.motors[0] = 1
     for a in range(n):
-        bias = work.bias[a] if work.option[TASK_BIAS] == 0.0 else 0.0
+        bias = work.balance[a] if work.option[TASK_BIAS] == 0.0 else 0.0
         work.space.start[a] = min(max(bias, -work.torque_limit[a]), work.torque_limit[a])
 
 
@@ -375,6 +379,8 @@ def status(work):
     for a in range(work.tau.shape[0]):
         if abs(work.tau[a]) > work.torque_limit[a]:
             bits |= ABOVE
+    if work.reaction_part[0] < 1.0 - GIVEN_WAY:
+        bits |= SCALED
     for d in range(work.scale.shape[0]):
         work.scale[d] = 1.0
         if work.option[KEEP_TORQUE] != 0.0 and work.space.got[d, 1] > 0.0:

@@ -3,7 +3,13 @@
 from opspace.law.activation import Activation, Buffer, Profile, Ramp
 from opspace.law.blending import BLENDINGS, Weighted, combined, corners, leaning_chain
 from opspace.law.hierarchy import levels_of, whiten
-from opspace.law.nearest import Nearest, excess, nearest_acceleration, task_metric
+from opspace.law.nearest import (
+    Nearest,
+    excess,
+    excess_of_rows,
+    nearest_acceleration,
+    task_metric,
+)
 from opspace.law.scalars import BROKEN, LOST, PROFILES
 from opspace.law.singular_directions import SigmaBuffer
 from opspace.law.tasksets import TaskSet
@@ -30,6 +36,7 @@ __all__ = [
     "combined",
     "corners",
     "excess",
+    "excess_of_rows",
     "intermediate_values",
     "leaning_chain",
     "levels_of",

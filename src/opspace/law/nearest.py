@@ -23,12 +23,15 @@ class Nearest(NamedTuple):
             it does not act.
         lower: (n,) the same of each lower bound.
         motors: Whether a bound on a torque acts.
+        rows: (k,) by how much each bound on a combination of accelerations lowers it; 0 where it does
+            not act.
     """
 
     acceleration: Float[np.ndarray, " n"]
     upper: Float[np.ndarray, " n"]
     lower: Float[np.ndarray, " n"]
     motors: bool
+    rows: Float[np.ndarray, " k"]
 
 
 def task_metric(
@@ -136,16 +139,16 @@ def nearest_within(
 
     Args:
         x: (n,).
-        rows: (k, n), none of them zero where its bound is finite.
+        rows: (k, n); a row that is zero bounds nothing.
         bounds: (k,), those from `UNBOUNDED` on are none.
         softness: (k,) above 0, of rows of unit length.
 
     Returns:
         The point, (n,), and by how much each bound moved it along its row, (k,).
     """
-    there = bounds < UNBOUNDED
-    taken = np.zeros(bounds.size)
     size = np.linalg.norm(rows, axis=1)
+    there = (bounds < UNBOUNDED) & (size > 0.0)
+    taken = np.zeros(bounds.size)
     unit = rows[there] / size[there, None]
     for _ in range(CLEANINGS):
         x, multipliers = nearest_point(x, unit, bounds[there] / size[there], softness[there])
@@ -161,11 +164,13 @@ def nearest_acceleration(
     upper: Float[np.ndarray, " n"],
     torque_lower: Float[np.ndarray, " n"],
     torque_upper: Float[np.ndarray, " n"],
+    combined: Float[np.ndarray, "k n"] | None = None,
+    most: Float[np.ndarray, " k"] | None = None,
 ) -> Nearest:
     """Find the acceleration within bounds that is nearest in a metric.
 
         min (q̈ − q̈₀)ᵀ L W Lᵀ (q̈ − q̈₀) + Σ excess²/softness
-        lower <= q̈ <= upper,   torque_lower <= A q̈ <= torque_upper
+        lower <= q̈ <= upper,   torque_lower <= A q̈ <= torque_upper,   combined q̈ <= most
 
     with every bound taken as a unit normal in the metric; what softness leaves of the excess where much
     is asked for is projected away again.
@@ -178,6 +183,9 @@ def nearest_acceleration(
         upper: (n,) largest accelerations, inf where there is none.
         torque_lower: (n,) least torques beside the bias, N·m.
         torque_upper: (n,) largest torques beside the bias, N·m.
+        combined: (k, n) combinations of accelerations that are bounded, such as those with which
+            distances shrink; None for none.
+        most: (k,) their bounds, inf where there is none.
 
     Returns:
         q̈ and what holds it.
@@ -189,13 +197,16 @@ def nearest_acceleration(
     rows = np.concatenate([joints, -joints, motors, -motors])
     bounds = np.concatenate([upper, -lower, torque_upper, -torque_lower])
     softness = np.repeat([SOFT, HARD], 2 * n)
-    if not np.any(bounds < UNBOUNDED):
-        taken = np.zeros(4 * n)
-        return Nearest(acceleration, taken[:n], taken[:n], motors=False)
+    if combined is not None and most is not None:
+        rows = np.concatenate([rows, np.linalg.solve(C, combined.T).T])
+        bounds = np.concatenate([bounds, most])
+        softness = np.concatenate([softness, np.full(most.size, SOFT)])
+    taken = np.zeros(bounds.size)
+    if not np.any((bounds < UNBOUNDED) & (np.linalg.norm(rows, axis=1) > 0.0)):
+        return Nearest(acceleration, taken[:n], taken[:n], motors=False, rows=taken[4 * n :])
     z, taken = nearest_within(C.T @ acceleration, rows, bounds, softness)
-    return Nearest(
-        np.linalg.solve(C.T, z), taken[:n], taken[n : 2 * n], motors=bool(np.any(taken[2 * n :]))
-    )
+    motors_act = bool(np.any(taken[2 * n : 4 * n]))
+    return Nearest(np.linalg.solve(C.T, z), taken[:n], taken[n : 2 * n], motors_act, taken[4 * n :])
 
 
 def excess(
@@ -214,6 +225,18 @@ def excess(
         The largest excess over max(1, |bound|), below or at zero where there is none.
     """
     over = np.concatenate([acceleration - upper, lower - acceleration])
-    bound = np.abs(np.concatenate([upper, lower]))
+    return _largest(over, np.abs(np.concatenate([upper, lower])))
+
+
+def excess_of_rows(
+    acceleration: Float[np.ndarray, " n"],
+    combined: Float[np.ndarray, "k n"],
+    most: Float[np.ndarray, " k"],
+) -> float:
+    """Tell by how much combinations of accelerations leave their bounds, as `excess` does."""
+    return _largest(combined @ acceleration - most, np.abs(most))
+
+
+def _largest(over: Float[np.ndarray, " k"], bound: Float[np.ndarray, " k"]) -> float:
     there = bound < UNBOUNDED
     return float(np.max(over[there] / np.maximum(1.0, bound[there]), initial=-np.inf))

@@ -463,6 +463,10 @@ LOST = 1e-3
 """A bound that is still broken by more than this part of itself, or by more than this, is lost."""
 
 
+NO_DISTANCE = 1e-3
+"""Centres of balls that come closer than this are in each other; no distance of theirs is left, m."""
+
+
 def room_for(part: np.ndarray, torque: np.ndarray, limit: np.ndarray) -> float:
     """Largest s in [0, 1] with which every joint stays inside its share of what is left.
 

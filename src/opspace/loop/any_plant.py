@@ -12,7 +12,8 @@ class AnyPlant(Protocol):
 
     One that adds the torque against its own weight to every command says so by an attribute
     ``adds_gravity = True``, and one that does not by False; a controller that was built for the other
-    kind is then refused.
+    kind is then refused. One that measures wrenches has a method ``wrenches()``, which returns what
+    `opspace.Controller.step` takes under that name.
 
     Attributes:
         dt: Time between two ticks, s.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -99,6 +99,15 @@ def check_gravity(plant: object, controller: object) -> None:
     )
 
 
+def _measured(plant: AnyPlant, controller: Stepping) -> dict[str, Any]:
+    """Read the wrenches of a plant that measures some, for a controller that takes them."""
+    read = getattr(plant, "wrenches", None)
+    if read is None or not hasattr(controller, "wrenches"):
+        return {}
+    found = read()
+    return {"wrenches": found} if found else {}
+
+
 def simulate(
     plant: AnyPlant,
     controller: Stepping,
@@ -133,7 +142,7 @@ def simulate(
         if not (np.all(np.isfinite(plant.q)) and np.all(np.isfinite(plant.v))):
             return Outcome(False, t, "the simulation diverged")
         q, v = plant.measure()
-        command = controller.step(t, q, v)
+        command = controller.step(t, q, v, **_measured(plant, controller))
         for observer in observers:
             observer.observe(q, v, command)
         reason = stop.reason(controller.robot, plant.v, command.tau)

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from opspace.machine.field_table import Block, Record
+from opspace.plan.distance_records import DISTANCES
 from opspace.plan.records import BOUNDS, INERTIA, SPACE, TICK
 from opspace.robots.motion_axes import MotionAxes
 
@@ -25,6 +26,9 @@ class Sizes(NamedTuple):
     variables: int
     limits: int
     corners: int
+    balls: int = 0
+    sets: int = 0
+    distances: int = 0
 
     def by_name(self) -> dict[str, int]:
         """Return them as the tables of `opspace.plan.records` take them."""
@@ -104,6 +108,7 @@ def make_tick(
         "later": axes.later,
         "later_inertia": make_inertia(_before(axes)),
         "bounds": BOUNDS.make(sizes),
+        "distances": DISTANCES.make(sizes),
     }
     return TICK.make(sizes, {**kept, **given}), block.memory
 

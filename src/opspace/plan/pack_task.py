@@ -12,6 +12,7 @@ import numpy as np
 from opspace.errors import InputError
 from opspace.kernels.columns import (
     BODY,
+    CARRIES,
     CENTRE_OF_MASS,
     COVERS_ALL,
     FIRST_ROW,
@@ -52,7 +53,9 @@ from opspace.robots.motion_axes import FramePlace, MotionAxes
 from opspace.stack import Member
 from opspace.tasks import TASK_KINDS, Task
 from opspace.tasks.activations import own_activation
+from opspace.tasks.force import ForceTask
 from opspace.tasks.gains import Gains
+from opspace.tasks.impedance import ImpedanceTask
 from opspace.tasks.motion_task import MotionTask
 from opspace.tasks.motions import CenterOfMass, RelativeFrame, WorldFrame
 from opspace.tasks.posture import PostureTask
@@ -81,6 +84,9 @@ does."""
 PACKED_ONCE = ("source", "quantity", "selection", "in_tool_axes", "layout", "rows")
 """Attributes that a subclass may not compute anew, as a property would."""
 
+EVALUATED_IN_PYTHON = (ForceTask, ImpedanceTask)
+"""Tasks of the library that no kernel evaluates."""
+
 MOST_JOINTS = 4 * SIGNS
 """Joints of a task whose signs fit into what compiled code remembers of it."""
 
@@ -94,6 +100,8 @@ def kind_of(task: Task) -> int:
     known = {one.task for one in TASK_KINDS.values()} | {MotionTask, PostureTask}
     built_in = next((base for base in kind.__mro__ if base in known), None)
     if built_in is None or _overrides(task, built_in) or type(task._gains) is not Gains:
+        return OWN
+    if isinstance(task, EVALUATED_IN_PYTHON):
         return OWN
     if isinstance(task, PostureTask):
         return JOINTS if task.rows <= MOST_JOINTS else OWN
@@ -264,6 +272,9 @@ class Packed:
             (terms.error, tick.error),
         ):
             kept[rows] = self._checked(given, kept[rows].shape, t)
+        tick.kind[self.index, CARRIES] = int(terms.torque is not None)
+        if terms.torque is not None:
+            tick.torque[self.index] = self._checked(terms.torque, robot.v.shape, t)
 
     def _checked(self, given: object, shape: tuple[int, ...], t: float) -> np.ndarray:
         found = np.asarray(given, dtype=float)

@@ -25,12 +25,13 @@ from opspace.law.scalars import NO_GROUP
 from opspace.machine.field_table import Record
 from opspace.machine.record import WORD
 from opspace.plan.memory import Sizes, make_tick
+from opspace.plan.pack_distances import PackedDistances
 from opspace.plan.pack_task import Packed
 from opspace.plan.scales import Scales
 from opspace.robots.adapter import AdapterBase
 from opspace.robots.motion_axes import MotionAxes
 from opspace.stack import Blending, Member, Variable, variables_of
-from opspace.tasks import JointLimits
+from opspace.tasks import CollisionAvoidance, JointLimits
 from opspace.tasks.task import CHANGES
 
 MOST = 62
@@ -79,6 +80,7 @@ class Plan:
         torque_limit: (n,) what the motors give, N·m.
         options: Numbers of the controller's options, (OPTION_SIZE,).
         blending: How activations are blended.
+        guard: What is kept apart, or None.
     """
 
     def __init__(
@@ -90,6 +92,7 @@ class Plan:
         torque_limit: np.ndarray,
         options: np.ndarray,
         blending: Blending,
+        guard: CollisionAvoidance | None = None,
     ) -> None:
         self.members = members
         self.structure = structure(members)
@@ -102,6 +105,8 @@ class Plan:
             ((p.level, i, k) for i, m in enumerate(members) for k, p in enumerate(m.places)),
             key=lambda place: place[:2],
         )
+        last = CHANGES.last
+        layout = None if guard is None else guard.layout()
         self.size = Sizes(
             n=axes.v.size,
             tasks=len(members),
@@ -112,13 +117,20 @@ class Plan:
             variables=len(self.variables),
             limits=0 if limits is None else len(limits.sides),
             corners=blending.most_corners(len(self.variables)),
+            balls=0 if layout is None else layout.ball_frame.size,
+            sets=0 if layout is None else layout.set_frame.size,
+            distances=0 if layout is None else len(layout.rows),
         )
         self.tick, self.memory = make_tick(self.size, axes, torque_limit, options)
-        last = CHANGES.last
         self.packed = self._pack(scales)
+        self.distances: PackedDistances | None = None
+        if guard is not None and layout is not None:
+            self.distances = PackedDistances(guard, layout, axes, self.tick)
         # Where everything is known ahead, the first tick need not look.
         self.moving = False
-        self.seen: object = last if all(packed.settled for packed in self.packed) else None
+        self.seen: object = None
+        if guard is None and all(packed.settled for packed in self.packed):
+            self.seen = last
         # As bytes: arrays take several times as long to read and write them.
         self._ramps = self.tick.variable.reshape(-1).view(np.uint8).data
         self._groups = self.tick.group.view(np.uint8).data
@@ -152,7 +164,10 @@ class Plan:
         last = CHANGES.last  # before the look at the tasks: what changes meanwhile is seen next
         for packed in self.packed:
             packed.refresh(robot, t)
+        if self.distances is not None:
+            self.distances.refresh(t)
         self.moving = any(packed.moving for packed in self.packed)
+        self.moving |= self.distances is not None and self.distances.moving
         self.seen = last
 
     def disturb(self, acceleration: np.ndarray) -> None:

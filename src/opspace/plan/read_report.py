@@ -8,7 +8,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from opspace.command import NO_CONTACTS, ContactStatus, Found, LevelStatus, TaskStatus
+from opspace.command import (
+    NO_CONTACTS,
+    ContactStatus,
+    Distance,
+    Found,
+    LevelStatus,
+    TaskStatus,
+)
 from opspace.kernels.columns import slot_bit
 from opspace.plan.entries import KERNELS
 from opspace.plan.memory import Reported
@@ -37,7 +44,12 @@ class CompiledReport:
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Be copied as what is told: the plan is of this controller, and its memory of this process."""
-        return Found, (dict(self.tasks), self.levels, dict(self.limits))
+        return Found, (
+            dict(self.tasks),
+            self.levels,
+            dict(self.limits),
+            dict(self.distances),
+        )
 
     @property
     def tasks(self) -> Mapping[str, TaskStatus]:
@@ -66,6 +78,15 @@ class CompiledReport:
     def contacts(self) -> Mapping[str, ContactStatus]:
         """Nothing: what has contacts takes the readable tick."""
         return NO_CONTACTS
+
+    @property
+    def distances(self) -> Mapping[str, Distance]:
+        """Pairs of bodies that are kept apart, by name, the nearest first."""
+        distances = self._plan.distances
+        if distances is None:
+            return {}
+        found = self._found()
+        return distances.layout.status(found["distance"], found["distance_taken"])
 
     def _task_status(self) -> dict[str, TaskStatus]:
         plan, found = self._plan, self._found()

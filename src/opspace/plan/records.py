@@ -14,6 +14,7 @@ from opspace.kernels.columns import (
     VARIABLE_SIZE,
 )
 from opspace.machine.field_table import Field, RecordTable
+from opspace.plan.distance_records import DISTANCES
 from opspace.robots.bodies import DYNAMICS, RIGID_BODIES
 
 SIZES = {
@@ -28,6 +29,9 @@ SIZES = {
     "levels": "levels of the stack",
     "variables": "activations in time: the tasks' presences, then their changes of place",
     "limits": "joint limits, sides counted",
+    "balls": "balls of the robot that keep away from something",
+    "sets": "convex sets that they keep away from",
+    "distances": "pairs of a ball and a set",
     "corners": "corners that the blend can have",
     "widest": "the larger of rows + limits and n, at least one",
     "states": "states of a batch",
@@ -62,6 +66,8 @@ INERTIA = RecordTable(
     _plan("end", ("n",), "one after the last that each carries", dtype=_INT),
 )
 
+_BOUNDS = "4 n + distances"
+
 BOUNDS = RecordTable(
     "Bounds",
     "Bounds on accelerations and torques, and the memory to keep them.",
@@ -71,21 +77,32 @@ BOUNDS = RecordTable(
     _work("most", ("n",), "largest torques beside the bias", "N·m", start=math.inf),
     _work("W", ("n", "n"), "metric in x = Uᵀ q̈, see `opspace.law.task_metric`"),
     _work("C", ("n", "n"), "its lower Cholesky factor"),
-    _work("normal", ("4 n", "n"), "every bound as unit normal · z <= bound, in z = Cᵀ x"),
-    _work("size", ("4 n",), "length of each normal before"),
-    _work("owner", ("4 n",), "which of upper, lower, most, least, n each, it is", dtype=_INT),
-    _work("taken", ("4 n",), "what each of these takes from its joint", "rad/s², N·m"),
-    _work("bound", ("4 n",), "the bounds", "√J/s"),
-    _work("softness", ("4 n",), "their softness"),
-    _work("multiplier", ("4 n",), "multipliers of the bounds", "√J/s"),
-    _work("wanted", ("4 n",), "multipliers of those that hold, if alone", "√J/s"),
-    _work("active", ("4 n",), "the bounds that hold", dtype=_INT),
+    _work("normal", (_BOUNDS, "n"), "every bound as unit normal · z <= bound, in z = Cᵀ x"),
+    _work("size", (_BOUNDS,), "length of each normal before"),
+    _work(
+        "owner",
+        (_BOUNDS,),
+        "which of upper, lower, most, least, n each, then distances, it is",
+        dtype=_INT,
+    ),
+    _work(
+        "taken",
+        (_BOUNDS,),
+        "what each of these takes from its joint or distance",
+        "rad/s², N·m, m/s²",
+    ),
+    _work("bound", (_BOUNDS,), "the bounds", "√J/s"),
+    _work("softness", (_BOUNDS,), "their softness"),
+    _work("multiplier", (_BOUNDS,), "multipliers of the bounds", "√J/s"),
+    _work("wanted", (_BOUNDS,), "multipliers of those that hold, if alone", "√J/s"),
+    _work("active", (_BOUNDS,), "the bounds that hold", dtype=_INT),
+    _work("z", ("n",), "the point that the law wants", "√J/s"),
     _work("x", ("n",), "the point that is projected", "√J/s"),
     _work("y", ("n",), "its projection", "√J/s"),
     _work("row", ("n",), "a normal before it has unit length"),
-    _work("r", ("4 n",), "right-hand side of the multipliers", "√J/s"),
-    _work("G", ("4 n", "4 n"), "products of the normals that hold"),
-    _work("factor", ("4 n", "4 n"), "Cholesky factor of G"),
+    _work("r", (_BOUNDS,), "right-hand side of the multipliers", "√J/s"),
+    _work("G", (_BOUNDS, _BOUNDS), "products of the normals that hold"),
+    _work("factor", (_BOUNDS, _BOUNDS), "Cholesky factor of G"),
 )
 
 _DEPTHS = "levels + 2"
@@ -174,11 +191,17 @@ TICK = RecordTable(
     _reported("share", ("slots",), "how much of a task is at each of its places"),
     _reported("error", ("rows",), "x_d − x", "m, rad"),
     _reported("limit_h", ("limits",), "how much each joint limit takes part"),
+    _reported("distance", ("distances",), "of two bodies that are kept apart", "m"),
+    _reported("distance_taken", ("distances",), "what each takes from how it shrinks", "m/s²"),
     _reported("scale", (_DEPTHS,), "part of its torque that each level got"),
     _terms("wanted", ("rows",), "f*, the commanded acceleration", "m/s², rad/s²"),
     _work("Jw", ("rows + limits", "n"), "whitened rows Ĵ = W J U⁻ᵀ"),
     _terms("J", ("rows", "n"), "Jacobians", "m, 1"),
     _terms("drift", ("rows",), "J̇ q̇", "m/s², rad/s²"),
+    _terms("torque", ("tasks", "n"), "balanced torque of each task that has one", "N·m"),
+    _work("reaction", ("n",), "what tasks expect of the world, balanced as bias", "N·m"),
+    _work("reaction_part", (1,), "how much of it the motors can give"),
+    _work("balance", ("n",), "bias and reaction", "N·m"),
     _work("fw", ("rows + limits",), "f̂ = W f̃", "√J/s"),
     _work("velocity", ("n", 6), "motion of the body behind each joint", "m/s, rad/s"),
     _work("acceleration", ("n", 6), "its rate at zero joint acceleration", "m/s², rad/s²"),
@@ -213,6 +236,7 @@ TICK = RecordTable(
     _record("bodies", of=RIGID_BODIES),
     _record("dynamics", of=DYNAMICS),
     _record("bounds", of=BOUNDS),
+    _record("distances", of=DISTANCES),
 )
 
 
@@ -247,4 +271,15 @@ SPECTRUM = RecordTable(
     _work("directions", ("here", "fewer"), "directions of the rows, as columns"),
 )
 
-TABLES = (TICK, SPACE, INERTIA, BOUNDS, RIGID_BODIES, DYNAMICS, STATES, REMEMBERED, SPECTRUM)
+TABLES = (
+    TICK,
+    SPACE,
+    INERTIA,
+    BOUNDS,
+    DISTANCES,
+    RIGID_BODIES,
+    DYNAMICS,
+    STATES,
+    REMEMBERED,
+    SPECTRUM,
+)

@@ -12,7 +12,7 @@ from opspace.errors import InputError, unknown_name
 from opspace.law import SigmaBuffer
 from opspace.plan.calibration import Calibration, Workspace
 from opspace.robots.protocol import Robot
-from opspace.tasks import JointTask, PostureTask, Task
+from opspace.tasks import ForceTask, JointTask, PostureTask, Task
 
 
 @dataclass(frozen=True)
@@ -24,10 +24,10 @@ class Singularity:
     separately for rows in metres and in radians. One default then serves every robot. With
     ``scale="absolute"`` they are in 1/kg and 1/(kg·m²), as in the paper.
 
-    With ``release`` below 1 a direction inside the buffer answers less and is damped, but arrives, and
-    only in the lower part of the buffer do the levels below get its motion, see
-    `opspace.law.SigmaBuffer`: fewer reachable targets rest with an error, and an arm that has been
-    stretched out comes back later.
+    A direction inside the buffer answers less and is damped, but arrives; only in the lower part of
+    the buffer, ``release``, do the levels below get its motion, see `opspace.law.SigmaBuffer`. With
+    a narrower release fewer reachable targets rest with an error, and an arm that has been stretched
+    out comes back later, perhaps not at all.
 
     Args:
         lower: σ at and below which a direction is absent.
@@ -44,12 +44,12 @@ class Singularity:
         UnknownNameError: An unknown scale or profile.
     """
 
-    lower: float = 0.1
-    upper: float = 0.6
+    lower: float = 0.05
+    upper: float = 0.7
     scale: str = "relative"
     profile: str = "quintic"
-    release: float = 1.0
-    damping: float = field(default=20.0, repr=False)
+    release: float = 0.4
+    damping: float = field(default=10.0, repr=False)
 
     def __post_init__(self) -> None:
         if self.scale not in ("relative", "absolute"):
@@ -68,6 +68,11 @@ class Singularity:
 
 
 DEFAULT_SINGULARITY = Singularity()
+
+
+FORCE = 0.1
+"""Reference of the rows of forces as a part of that of motions. What such a row asks for is damping, and
+a speed that falls with σ, whose torques stay bounded where σ goes to zero: it fades much later."""
 
 
 class Scales:
@@ -154,4 +159,4 @@ class Scales:
             return np.full(task.rows, self.joint)
         if self._option.scale == "absolute":
             return np.ones(task.rows)
-        return workspace
+        return FORCE * workspace if isinstance(task, ForceTask) else workspace

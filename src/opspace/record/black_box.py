@@ -16,13 +16,15 @@ from numpy.typing import ArrayLike
 
 from opspace.command import Command, Status
 from opspace.controller import ReferenceController
+from opspace.controller.wrenches import Wrenches
 from opspace.errors import InputError, OpspaceError, RecordingError
 from opspace.record.format import Ended
 from opspace.record.observer import STATUS, state_columns
+from opspace.record.wrench_columns import Given, columns_of_wrenches, row_of_wrenches
 from opspace.record.writer import Recorder
 from opspace.robots import Robot
 
-FAILURES = Status.FAULT | Status.LIMIT_LOST
+FAILURES = Status.FAULT | Status.LIMIT_LOST | Status.COLLISION_LOST
 """What is written down by itself; a tick that raises always is."""
 
 MOST = 20
@@ -36,8 +38,8 @@ FIRST = "first"
 FAILURE = "failure"
 
 _both = int.__and__  # that of flags is Python's and slow
-_Tick = tuple[float, bytes, bytes, bytes, int]
-"""t, q, v, τ and status of a tick."""
+_Tick = tuple[float, bytes, bytes, bytes, int, Given]
+"""t, q, v, τ, status and wrenches of a tick."""
 
 
 class BlackBox:
@@ -82,6 +84,7 @@ class BlackBox:
         except OSError as error:
             raise RecordingError(f"{directory}: cannot be written: {error.strerror}") from error
         self._robot, self._tick = controller.robot, controller.step
+        self._controller = controller
         self._gravity = controller.gravity
         self._header = dict(header or {})
         self._on = int(on)
@@ -106,21 +109,35 @@ class BlackBox:
         """Who adds the torque that holds the weight, see `opspace.Controller`."""
         return self._gravity
 
-    def step(self, t: float, q: ArrayLike, v: ArrayLike) -> Command:
+    @property
+    def wrenches(self) -> Given:
+        """Wrenches that the last tick was given, see `opspace.Controller.wrenches`."""
+        return self._controller.wrenches
+
+    def step(
+        self, t: float, q: ArrayLike, v: ArrayLike, *, wrenches: Wrenches | None = None
+    ) -> Command:
         """Compute the torque for one state; see `opspace.Controller.step`."""
         try:
-            command = self._tick(t, q, v)
+            command = self._tick(t, q, v, wrenches=wrenches)
         except Exception as error:
-            self._keep_refused(t, q, v)
+            self._keep_refused(t, q, v, wrenches)
             self._failed(RAISED, f"{type(error).__name__}: {error}", None)
             raise
         # Bytes are copied quicker than rows of an array are written; the robot holds the state as
         # the controller took it.
         robot, status = self._robot, command.status
-        self._kept.append((t, robot.q.tobytes(), robot.v.tobytes(), command.tau.tobytes(), status))
+        given = self._controller.wrenches
+        state = robot.q.tobytes(), robot.v.tobytes()
+        self._kept.append((t, *state, command.tau.tobytes(), status, given))
         self._seen += 1
         if self._first is None:
             self._first = {"t": float(t), "q": robot.q.tolist(), "v": robot.v.tolist()}
+            if given:
+                self._first["wrenches"] = {
+                    name: None if wrench is None else wrench.tolist()
+                    for name, wrench in given.items()
+                }
         if _both(status, self._on):
             kind = "|".join(s.name or "" for s in Status if s & status & self._on)
             self._failed(kind, kind, command)
@@ -132,13 +149,19 @@ class BlackBox:
         for writing in self._writing:
             writing.result()
 
-    def _keep_refused(self, t: float, q: ArrayLike, v: ArrayLike) -> None:
+    def _keep_refused(
+        self, t: float, q: ArrayLike, v: ArrayLike, wrenches: Wrenches | None
+    ) -> None:
         """Remember a tick that has no torque, as far as it is made of numbers."""
         n = self._robot.nv
         when = _numbers(t, 1)[0]
         torque = np.full(n, np.nan).tobytes()
         state = _numbers(q, self._robot.nq).tobytes(), _numbers(v, n).tobytes()
-        self._kept.append((when, *state, torque, 0))
+        given = {
+            str(name): None if wrench is None else _numbers(wrench, 6)
+            for name, wrench in (wrenches or {}).items()
+        }
+        self._kept.append((when, *state, torque, 0, given))
         self._seen += 1
 
     def _failed(self, kind: str, reason: str, command: Command | None) -> None:
@@ -169,10 +192,11 @@ class BlackBox:
             FAILURE: {"kind": kind, "row": len(kept) - 1},
             "tasks": _tasks(command if command is not None and command.tasks else before),
         }
-        columns = [*state_columns(self.robot), STATUS]
+        sensors = tuple(sorted({name for tick in kept for name in tick[-1]}))
+        columns = [*state_columns(self.robot), STATUS, *columns_of_wrenches(sensors)]
         try:
             with Recorder(path, columns, header) as recorder:
-                recorder.extend(_rows(kept))
+                recorder.extend(_rows(kept, sensors))
                 recorder.close(ended, reason)
         except OpspaceError as error:
             warnings.warn(f"the black box could not be written: {error}", stacklevel=1)
@@ -186,10 +210,13 @@ def _numbers(values: ArrayLike | float, size: int) -> np.ndarray:
         return np.full(size, np.nan)
 
 
-def _rows(kept: Sequence[_Tick]) -> np.ndarray:
+def _rows(kept: Sequence[_Tick], sensors: Sequence[str]) -> np.ndarray:
     """Write ticks as rows of a recording."""
-    t, q, v, tau, status = zip(*kept, strict=True)
+    t, q, v, tau, status, given = zip(*kept, strict=True)
     groups = [np.frombuffer(b"".join(group)).reshape(len(kept), -1) for group in (q, v, tau)]
+    if sensors:
+        wrenches = [np.concatenate(row_of_wrenches(tick, sensors)) for tick in given]
+        return np.column_stack([t, *groups, status, wrenches])
     return np.column_stack([t, *groups, status])
 
 

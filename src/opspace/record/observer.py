@@ -12,6 +12,13 @@ from opspace.controller import ReferenceController
 from opspace.errors import InputError
 from opspace.record.format import Column, Ended
 from opspace.record.subject import subject_of
+from opspace.record.wrench_columns import (
+    columns_of_touches,
+    columns_of_wrenches,
+    row_of_touches,
+    row_of_wrenches,
+    sensors_of,
+)
 from opspace.record.writer import Recorder
 from opspace.robots import Robot
 from opspace.robots.joint_units import effort_unit, joint_units
@@ -72,7 +79,7 @@ def columns_of(
         )
         columns += [
             Column(f"tasks/{task.name}/error/{i}", unit, f"row {i}: desired minus actual")
-            for i, unit in enumerate(task.units)
+            for i, unit in enumerate(task.error_units)
         ]
     for number, level in levels.items():
         size, prefix = _directions(controller, level), f"levels/{number:g}"
@@ -94,8 +101,16 @@ def columns_of(
             Column(f"limits/{side.name}", "1", f"activation of the limit {side.name}")
             for side in stack.limits.sides
         ]
+    if controller.collisions is not None:
+        columns += [
+            Column("distances/least", "m", "distance of the nearest pair that is kept apart"),
+            Column("distances/taken", "m/s²", "the most that a pair slows down its approach"),
+        ]
+    recorded = [*stack, *tasks]
     return [
         *columns,
+        *columns_of_wrenches(sensors_of(recorded)),
+        *columns_of_touches(recorded),
         Column("hard_solves", "1", "hard torques in the blend"),
         STATUS,
     ]
@@ -148,6 +163,7 @@ class TickRecorder:
         levels = stack.levels_by_number if levels is None else levels
         self._tasks = {task.name: task for task in [*stack, *tasks]}
         self._levels = {number: _directions(controller, level) for number, level in levels.items()}
+        self._sensors = sensors_of(list(self._tasks.values()))
         self._truth = truth
         columns = columns_of(controller, tasks, levels)
         if truth is not None:
@@ -176,6 +192,12 @@ class TickRecorder:
             # Worked out anew each time it is asked for.
             limits = command.limits
             parts.append([limits.get(s.name, 0.0) for s in controller.stack.limits.sides])
+        if controller.collisions is not None:
+            apart = command.distances.values()
+            least = min((pair.distance for pair in apart), default=np.inf)
+            parts.append([least, max((pair.taken for pair in apart), default=0.0)])
+        parts += row_of_wrenches(controller.wrenches, self._sensors)
+        parts += row_of_touches(list(self._tasks.values()))
         parts.append([float(command.hard_solves), float(command.status)])
         if self._truth is not None:
             parts += self._truth()

@@ -13,8 +13,9 @@ from opspace.controller import ReferenceController
 from opspace.errors import OpspaceError, RecordingError
 from opspace.record.black_box import FIRST
 from opspace.record.reader import Recording, load
+from opspace.record.wrench_columns import Given, recorded_wrenches
 
-_Row = tuple[float, np.ndarray, np.ndarray, np.ndarray, float]
+_Row = tuple[float, np.ndarray, np.ndarray, np.ndarray, float, Given | None]
 
 
 @dataclass
@@ -72,8 +73,8 @@ def replay(
     rows = _rows(recording, controller)
     found = Replay(len(recording), f"{recording.ended.how} {recording.ended.reason}".strip())
     _begin(recording, controller)
-    for t, q, v, tau, _ in rows[:-1]:
-        command = controller.step(t, q, v)
+    for t, q, v, tau, _, wrenches in rows[:-1]:
+        command = controller.step(t, q, v, wrenches=wrenches)
         observe(q, v, command)
         _compare(found, t, command, tau)
     if rows:
@@ -84,9 +85,9 @@ def replay(
 
 def _last(found: Replay, row: _Row, controller: ReferenceController) -> None:
     """Replay the last tick, which may have ended the run."""
-    t, q, v, tau, status = row
+    t, q, v, tau, status, wrenches = row
     try:
-        command = controller.step(t, q, v)
+        command = controller.step(t, q, v, wrenches=wrenches)
     except Exception as error:
         found.last = f"{type(error).__name__}: {error}"
         found.repeated = found.ended.endswith(found.last)
@@ -110,7 +111,8 @@ def _rows(recording: Recording, controller: ReferenceController) -> list[_Row]:
         raise RecordingError(f"{where} cannot be replayed: {error}") from error
     if not q.shape[1] == robot.nq or not v.shape[1] == tau.shape[1] == robot.nv:
         raise RecordingError(f"{where} is not of a robot like {robot.name!r}")
-    return list(zip(t.tolist(), q, v, tau, status.tolist(), strict=True))
+    wrenches = recorded_wrenches(recording)
+    return list(zip(t.tolist(), q, v, tau, status.tolist(), wrenches, strict=True))
 
 
 def _begin(recording: Recording, controller: ReferenceController) -> None:
@@ -120,12 +122,13 @@ def _begin(recording: Recording, controller: ReferenceController) -> None:
         return
     try:
         t, q, v = float(first["t"]), np.array(first["q"], float), np.array(first["v"], float)
+        wrenches = first.get("wrenches") or None
     except (KeyError, TypeError, ValueError) as error:
         raise RecordingError(
             f"{recording.directory} does not tell its first tick: {error}"
         ) from error
     if len(recording) and recording.t[0] > t:
-        controller.step(t, q, v)
+        controller.step(t, q, v, wrenches=wrenches)
 
 
 def _compare(found: Replay, t: float, command: Command, tau: np.ndarray) -> None:

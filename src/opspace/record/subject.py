@@ -72,7 +72,7 @@ def _has_name(robot: Robot) -> bool:
 
 def _task(task: Task, level: float | None) -> dict[str, Any]:
     return {
-        "units": list(task.units),
+        "units": list(task.error_units),
         "kp": np.asarray(task.kp).tolist(),
         "level": level,
         "led_by": _led_by(task),

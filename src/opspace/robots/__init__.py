@@ -5,3 +5,4 @@ from opspace.robots.protocol import Robot as Robot
 from opspace.robots.registry import RobotInfo as RobotInfo
 from opspace.robots.registry import available_robots as available_robots
 from opspace.robots.registry import load_robot as load_robot
+from opspace.robots.wrist_sensor import WristSensor as WristSensor

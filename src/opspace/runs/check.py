@@ -180,12 +180,18 @@ def _singular(task: Task, sigma: tuple[float, ...], option: Singularity) -> list
     missing = task.rows - len(sigma)
     if missing > 0:
         return [f"{missing} of {task.rows} directions of the {task.name} cannot be moved at all"]
-    if sigma[-1] < option.upper:
-        return [
-            f"the reference posture is near a singularity of the {task.name}: the weakest "
-            f"eigenvalue {sigma[-1]:.3g} lies inside the buffer, below {option.upper:g}"
-        ]
-    return []
+    if sigma[-1] >= option.upper:
+        return []
+    released = option.buffer.release_upper
+    effect = (
+        f"below {released:.2g}, where lower levels pull at it and targets keep an error"
+        if sigma[-1] < released
+        else f"below {option.upper:g}, where it answers less and targets are reached later"
+    )
+    return [
+        f"the reference posture is near a singularity of the {task.name}: the weakest "
+        f"eigenvalue {sigma[-1]:.3g} lies {effect}"
+    ]
 
 
 def _joint_warnings(joints: tuple[JointReport, ...]) -> list[str]:

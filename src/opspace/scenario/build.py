@@ -76,6 +76,7 @@ def build(scenario: Scenario, controller: Callable[..., ReferenceController] = C
     robot.update(q, np.zeros(robot.nv))
     tasks = build_tasks(scenario, robot)
     stack = Stack(_levels(scenario, tasks), limits=_joint_limits(scenario))
+    kept_apart = _collisions(scenario, robot)
     try:
         driver = controller(
             robot,
@@ -84,6 +85,7 @@ def build(scenario: Scenario, controller: Callable[..., ReferenceController] = C
             torque_limits=scenario.torque_limits,
             bias=scenario.bias,
             singularity=_singularity(scenario),
+            **kept_apart,
         )
     except (InputError, UnknownNameError) as error:
         raise scenario.error(
@@ -204,6 +206,18 @@ def _joint_limits(scenario: Scenario) -> JointLimits | None:
         brake_acceleration=option.brake_acceleration,
         profile=SWITCH if scenario.method == "switch" else option.profile,
     )
+
+
+def _collisions(scenario: Scenario, robot: Robot) -> dict[str, Any]:
+    """Bind what is kept apart to the robot; the option of a controller, none where there is nothing."""
+    if scenario.collisions is None or scenario.method == "none":
+        return {}
+    try:
+        guard = scenario.collisions.build()
+        guard.bind(robot)
+    except OpspaceError as error:
+        raise scenario.error(("collisions",), str(error)) from error
+    return {"collisions": guard}
 
 
 def _unknown_joints(scenario: Scenario, robot: Robot) -> tuple[str, ...]:

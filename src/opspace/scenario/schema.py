@@ -12,6 +12,7 @@ from opspace.law.scalars import LIMIT_LAWS
 from opspace.scenario.document import Document, Key, key_text
 from opspace.scenario.events import Event, ProfileName, check_events
 from opspace.scenario.fields import Checked, Entry, Number, problem, shown, whole
+from opspace.scenario.obstacle_entries import CollisionsEntry
 from opspace.scenario.targets import Configuration
 from opspace.scenario.task_entries import AnyTask
 
@@ -31,10 +32,10 @@ class SingularityEntry(Entry):
     """
 
     lower: Annotated[float, Number("1", above=0.0)] = Field(
-        default=0.1, description="eigenvalue at and below which a direction is absent"
+        default=0.05, description="eigenvalue at and below which a direction is absent"
     )
     upper: Annotated[float, Number("1", above=0.0)] = Field(
-        default=0.6, description="eigenvalue at and above which a direction is fully active"
+        default=0.7, description="eigenvalue at and above which a direction is fully active"
     )
     scale: Literal["relative", "absolute"] = Field(
         default="relative",
@@ -42,11 +43,11 @@ class SingularityEntry(Entry):
     )
     profile: ProfileName = Field(default="quintic", description="shape of the activation")
     release: Annotated[float, Number("1", above=0.0, at_most=1.0)] = Field(
-        default=1.0,
+        default=0.4,
         description="part of the buffer in which directions are released to lower levels",
     )
     damping: Annotated[float, Number("1/s", at_least=0.0)] = Field(
-        default=20.0, description="of the joint motion along a direction that answers in part"
+        default=10.0, description="of the joint motion along a direction that answers in part"
     )
 
     @model_validator(mode="after")
@@ -210,6 +211,9 @@ class Scenario(Entry):
     )
     joint_limits: JointLimitsEntry | None = Field(
         default_factory=JointLimitsEntry, description="joint limit avoidance; null is none"
+    )
+    collisions: CollisionsEntry | None = Field(
+        default=None, description="what the robot must not touch; null is nothing"
     )
     singularity: SingularityEntry | None = Field(
         default_factory=SingularityEntry, description="singularity avoidance; null is none"

@@ -5,3 +5,4 @@ from opspace.sim.disturbances import Push as Push
 from opspace.sim.ground import Ground as Ground
 from opspace.sim.ground import Wall as Wall
 from opspace.sim.mujoco_plant import Plant as Plant
+from opspace.sim.surfaces import Surface as Surface

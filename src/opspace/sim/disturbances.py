@@ -52,6 +52,8 @@ class Disturbances:
         position_noise: Standard deviation of every measured joint position, rad or m.
         velocity_noise: Standard deviation of every measured joint velocity, rad/s or m/s.
         pushes: Forces on the tool.
+        wrench_noise: Standard deviation of every measured force, N; a hundredth of it N·m.
+        wrench_delay: How long a wrench takes to be measured, s; rounded to whole ticks.
         seed: What the random numbers come from; the same seed gives the same robot and noise.
     """
 
@@ -61,10 +63,20 @@ class Disturbances:
     position_noise: float = 0.0
     velocity_noise: float = 0.0
     pushes: Sequence[Push] = ()
+    wrench_noise: float = 0.0
+    wrench_delay: float = 0.0
     seed: int = 0
 
     def __post_init__(self) -> None:
-        names = ("mass_error", "dry_friction", "delay", "position_noise", "velocity_noise")
+        names = (
+            "mass_error",
+            "dry_friction",
+            "delay",
+            "position_noise",
+            "velocity_noise",
+            "wrench_noise",
+            "wrench_delay",
+        )
         for name in names:
             value = getattr(self, name)
             if not (math.isfinite(value) and value >= 0.0):
@@ -98,6 +110,10 @@ class Disturbances:
     def sensors(self) -> Sensors:
         """Build the sensors of a run."""
         return Sensors(self.position_noise, self.velocity_noise, self._stream(1))
+
+    def wrist(self, dt: float) -> Wrist:
+        """Build the wrench sensor of a run with ticks of ``dt`` [s]."""
+        return Wrist(self.wrench_noise, round(self.wrench_delay / dt), self._stream(2))
 
     def _stream(self, number: int) -> np.random.Generator:
         # A stream for each purpose: noise stays what it is when masses are no longer drawn.
@@ -141,6 +157,27 @@ class Sensors:
         return robot.integrate(q, wrong, 1.0), v + self._velocity * self._rng.standard_normal(
             v.size
         )
+
+
+class Wrist:
+    """Measures a wrench late and with noise.
+
+    Args:
+        noise: Standard deviation of a force, N; a hundredth of it is that of a moment, N·m.
+        ticks: How many ticks late.
+        rng: Where the noise comes from.
+    """
+
+    def __init__(self, noise: float, ticks: int, rng: np.random.Generator) -> None:
+        self._noise = noise * np.array([1.0, 1.0, 1.0, 0.01, 0.01, 0.01])
+        self._wire, self._rng = Wire(ticks), rng
+
+    def read(self, wrench: np.ndarray) -> np.ndarray:
+        """Put in the wrench that there is, (6,) N and N·m, and take out what is measured of it."""
+        late = self._wire.send(wrench)
+        if not np.any(self._noise):
+            return np.array(late)
+        return late + self._noise * self._rng.standard_normal(6)
 
 
 class Wire:

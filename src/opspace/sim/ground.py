@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from opspace.contacts import Contact, SoleContact
+from opspace.contacts import GroundContact, SoleContact
 from opspace.errors import InputError
 
 RADIUS = 0.005
@@ -54,7 +54,7 @@ class Ground:
         InputError: Nothing touches, or a number that cannot be used.
     """
 
-    contacts: Sequence[Contact]
+    contacts: Sequence[GroundContact]
     height: float = 0.0
     friction: float = 0.8
     time_constant: float = 0.01
@@ -130,7 +130,7 @@ class Ground:
         return found
 
 
-def corners(contact: Contact) -> Iterator[np.ndarray]:
+def corners(contact: GroundContact) -> Iterator[np.ndarray]:
     """Give the middles of the balls with which a contact touches, (3,) in its frame."""
     if isinstance(contact, SoleContact):
         x, y = contact.half
@@ -140,7 +140,7 @@ def corners(contact: Contact) -> Iterator[np.ndarray]:
         yield np.array(contact.offset)
 
 
-def _body(spec: Any, contact: Contact) -> tuple[Any, np.ndarray, np.ndarray]:
+def _body(spec: Any, contact: GroundContact) -> tuple[Any, np.ndarray, np.ndarray]:
     """Find the body of a frame, and where the frame is in it."""
     import mujoco  # noqa: PLC0415 - an extra, and slow to import
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,6 +12,7 @@ from opspace.errors import InputError, ModelError, missing_extra
 from opspace.robots.adapter import spread_of
 from opspace.sim.disturbances import NO_DISTURBANCES, Disturbances, Hand, Wire
 from opspace.sim.ground import Ground
+from opspace.sim.surfaces import Surface, TouchedWorld
 
 if TYPE_CHECKING:
     from opspace.robots.protocol import Robot
@@ -22,6 +24,10 @@ def _import_mujoco() -> Any:
     except ImportError:
         raise missing_extra("mujoco", "sim") from None
     return mujoco
+
+
+FINEST = 2.5e-4
+"""Steps in which a stiff surface is simulated, s."""
 
 
 class Plant:
@@ -38,7 +44,9 @@ class Plant:
             drivers are told the rest only; see ``gravity`` of `opspace.Controller`.
         disturbances: What the controller's model does not know.
         ground: What a robot with a floating base stands on; None is nothing.
-        substeps: Steps of the simulation in one time step.
+        surfaces: What the tool may touch; the wrench there is measured.
+        substeps: Steps of the simulation in each time step; None is 1, or with surfaces as many
+            as make them at most 0.25 ms.
 
     Raises:
         MissingExtraError: MuJoCo is not installed.
@@ -58,21 +66,21 @@ class Plant:
         adds_gravity: bool = False,
         disturbances: Disturbances = NO_DISTURBANCES,
         ground: Ground | None = None,
-        substeps: int = 1,
+        surfaces: Sequence[Surface] = (),
+        substeps: int | None = None,
     ) -> None:
         if not (math.isfinite(dt) and dt > 0.0):
             raise InputError(f"the time step must be above 0 s, got {dt}")
+        self._substeps = _checked_substeps(substeps, dt, bool(surfaces))
         mujoco = _import_mujoco()
         from opspace.robots.mujoco_model import model_of  # noqa: PLC0415 - imports mujoco
 
         if robot.source is None:
             raise ModelError(f"robot {robot.name!r} has no file that a simulator could load")
         self._mujoco = mujoco
-        if substeps < 1:
-            raise InputError(f"a time step has at least one substep, got {substeps}")
         self.model = model_of(robot, None if ground is None else ground.add_to)
-        self.model.opt.timestep = dt / substeps
-        self._ground, self._substeps = ground, substeps
+        self.model.opt.timestep = dt / self._substeps
+        self._ground = ground
         # Implicit in the velocity: stable for stiff friction, exact for a frictionless arm to O(dt).
         self.model.opt.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
         # Joint ranges are the controller's job, and a stop or a contact would hide its failures.
@@ -101,6 +109,8 @@ class Plant:
         self._wire = Wire(round(disturbances.delay / dt))
         self._hand = Hand(robot, disturbances.pushes)
         self._sensors = disturbances.sensors()
+        self._world = TouchedWorld(robot, surfaces)
+        self._wrist = disturbances.wrist(dt)
         self.data = mujoco.MjData(self.model)
         if disturbances.mass_error:
             mujoco.mj_setConst(self.model, self.data)
@@ -171,12 +181,36 @@ class Plant:
         applied = np.clip(asked, -self._limit, self._limit)
         push = self._hand.torque(self.t, self._own(self.data.qpos), self._own(self.data.qvel))
         given = applied if push is None else applied + push
+        for _ in range(self._substeps):
+            self._step(given)
+
+    def wrenches(self) -> dict[str, np.ndarray]:
+        """Measure the wrench of the tool on what it touches, as `opspace.Controller.step` takes it.
+
+        Returns:
+            (6,) N and N·m in world axes, by name of the tool; nothing where there are no surfaces.
+        """
+        if not self._world.surfaces:
+            return {}
+        self._world.torque(self.q, self.v)
+        return {self._world.name: self._wrist.read(self._world.wrench)}
+
+    @property
+    def exerted(self) -> np.ndarray:
+        """Wrench of the tool on what it touches as it is, (6,) N and N·m in world axes."""
+        if self._world.surfaces:
+            self._world.torque(self.q, self.v)
+        return self._world.wrench.copy()
+
+    def _step(self, given: np.ndarray) -> None:
+        if self._world.surfaces:
+            q, v = self._own(self.data.qpos), self._own(self.data.qvel)
+            given = given + self._world.torque(q, v)
         if self._spread is None:
             self.data.qfrc_applied[:] = given
         else:
             self.data.qfrc_applied[self._spread.leaders] = given
-        for _ in range(self._substeps):
-            self._mujoco.mj_step(self.model, self.data)
+        self._mujoco.mj_step(self.model, self.data)
 
     @property
     def contact_forces(self) -> dict[str, np.ndarray]:
@@ -186,3 +220,11 @@ class Plant:
     def _own(self, values: np.ndarray) -> np.ndarray:
         """Leave the joints that lead; those that follow belong to the simulation."""
         return values if self._spread is None else values[self._spread.leaders]
+
+
+def _checked_substeps(substeps: int | None, dt: float, touching: bool) -> int:
+    if substeps is None:
+        return math.ceil(dt / FINEST - 1e-9) if touching else 1
+    if substeps < 1:
+        raise InputError(f"a time step has at least one step of the simulation, not {substeps}")
+    return substeps

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from threading import Lock
 from typing import NamedTuple
 
-from opspace.contacts import Contact
+from opspace.contacts import GroundContact
 from opspace.errors import InputError, unknown_name
 from opspace.law import PROFILES
 from opspace.law.blending import MOST_MOVING
@@ -40,7 +40,7 @@ class ContactMember:
         waiting: Whether it waits now.
     """
 
-    contact: Contact
+    contact: GroundContact
     progress: float
     target: float
     duration: float = 0.0
@@ -90,7 +90,7 @@ class _Asked(NamedTuple):
     """A request that waits for its time."""
 
     start: float
-    contact: Contact
+    contact: GroundContact
     target: float
     timing: Timing
     waits: bool
@@ -106,12 +106,12 @@ class ContactCourse:
         self._members: dict[str, ContactMember] = {}
         self._queue: list[_Asked] = []
         self._present: tuple[ContactMember, ...] = ()
-        self._bind: Callable[[Contact], None] | None = None
+        self._bind: Callable[[GroundContact], None] | None = None
         self._now: float | None = None
         self._hindrance = 0.0
         self._lock = Lock()
 
-    def __iter__(self) -> Iterator[Contact]:
+    def __iter__(self) -> Iterator[GroundContact]:
         """Iterate over the contacts, with those that wait to come."""
         with self._lock:
             known = {m.contact.name: m.contact for m in self._members.values()}
@@ -130,7 +130,7 @@ class ContactCourse:
             due = any(asked.start <= now for asked in self._queue)
             return not due and all(m.progress == m.target for m in self._members.values())
 
-    def start_with(self, contact: Contact) -> None:
+    def start_with(self, contact: GroundContact) -> None:
         """Add a contact that is in from the start.
 
         Raises:
@@ -140,13 +140,13 @@ class ContactCourse:
         self._members[contact.name] = ContactMember(contact, 1.0, 1.0)
         self._present = tuple(self._members.values())
 
-    def attach(self, bind: Callable[[Contact], None]) -> None:
+    def attach(self, bind: Callable[[GroundContact], None]) -> None:
         """Bind every contact that is there or will be."""
         for contact in self:
             bind(contact)
         self._bind = bind
 
-    def insert(self, contact: Contact, timing: Timing) -> None:
+    def insert(self, contact: GroundContact, timing: Timing) -> None:
         """Let a contact come, or come back.
 
         Raises:
@@ -168,7 +168,7 @@ class ContactCourse:
         if len(list(self)) >= MOST_MOVING:
             raise InputError(f"a stack takes at most {MOST_MOVING} contacts")
 
-    def remove(self, subject: Contact | str, timing: Timing, *, wait: bool) -> None:
+    def remove(self, subject: GroundContact | str, timing: Timing, *, wait: bool) -> None:
         """Let a contact go.
 
         Raises:
@@ -180,7 +180,7 @@ class ContactCourse:
             raise unknown_name("contact in the stack", name, known)
         self._ask(known[name], 0.0, timing, waits=wait)
 
-    def _ask(self, contact: Contact, target: float, timing: Timing, *, waits: bool) -> None:
+    def _ask(self, contact: GroundContact, target: float, timing: Timing, *, waits: bool) -> None:
         start = -math.inf if timing.start_time is None else timing.start_time
         with self._lock:
             self._queue.append(_Asked(start, contact, target, timing, waits))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import overload
 
-from opspace.contacts import Contact
+from opspace.contacts import GroundContact
 from opspace.errors import InputError, unknown_name
 from opspace.stack.changes import (
     Insert,
@@ -58,7 +58,7 @@ class Stack:
         levels: Sequence[Task | JointLimits | Sequence[Task]]
         | Mapping[float, Task | Sequence[Task]],
         limits: JointLimits | None = None,
-        contacts: Sequence[Contact] = (),
+        contacts: Sequence[GroundContact] = (),
     ) -> None:
         if isinstance(levels, Task | JointLimits):
             raise InputError(f"a stack takes a list of tasks: Stack([{levels!r}])")
@@ -165,7 +165,7 @@ class Stack:
         return self._transitions.present()
 
     @property
-    def contacts(self) -> Mapping[str, Contact]:
+    def contacts(self) -> Mapping[str, GroundContact]:
         """The contacts by name; those that are leaving or wait for their time are among them."""
         return {contact.name: contact for contact in self._contacts}
 
@@ -183,7 +183,7 @@ class Stack:
     @overload
     def insert(
         self,
-        task: Contact,
+        task: GroundContact,
         duration: float = 0.5,
         /,
         *,
@@ -194,7 +194,7 @@ class Stack:
     @overload
     def insert(
         self,
-        task: Contact,
+        task: GroundContact,
         *,
         duration: float,
         profile: str = "quintic",
@@ -203,7 +203,7 @@ class Stack:
 
     def insert(
         self,
-        task: Task | Contact,
+        task: Task | GroundContact,
         level: float | None = None,
         duration: float | None = None,
         *,
@@ -230,7 +230,7 @@ class Stack:
                 a number that cannot be used.
             UnknownNameError: A frame or joint that the robot does not have, or an unknown profile.
         """
-        if isinstance(task, Contact):
+        if isinstance(task, GroundContact):
             if level is not None and duration is not None:
                 raise InputError(f"a contact has no level: insert({task.name!r}, duration)")
             found = next((one for one in (duration, level) if one is not None), 0.5)
@@ -246,13 +246,13 @@ class Stack:
             )
         self._transitions.ask(Insert(timing, task, checked_level(level)))
 
-    def _new_contact(self, contact: object) -> Contact:
+    def _new_contact(self, contact: object) -> GroundContact:
         """Check that something is a contact with a name that no task has.
 
         Raises:
             InputError: It is not.
         """
-        if not isinstance(contact, Contact):
+        if not isinstance(contact, GroundContact):
             raise InputError(
                 f"contacts are SoleContact or PointContact, not {type(contact).__name__}"
             )
@@ -265,7 +265,7 @@ class Stack:
 
     def remove(
         self,
-        task: Task | Contact | str,
+        task: Task | GroundContact | str,
         duration: float = 0.5,
         *,
         profile: str = "quintic",
@@ -288,7 +288,7 @@ class Stack:
         """
         timing = Timing(duration, profile, start_time)
         name = task if isinstance(task, str) else getattr(task, "name", None)
-        if isinstance(task, Contact) or (name in self.contacts and isinstance(task, str)):
+        if isinstance(task, GroundContact) or (name in self.contacts and isinstance(task, str)):
             self._contacts.remove(task, timing, wait=wait is not False)
             return
         if wait is not None:
@@ -383,7 +383,7 @@ class Stack:
         self._transitions.resume()
         self._contacts.resume()
 
-    def attach_contacts(self, bind: Callable[[Contact], None]) -> None:
+    def attach_contacts(self, bind: Callable[[GroundContact], None]) -> None:
         """Let a controller bind every contact that is in the stack or will be.
 
         Args:

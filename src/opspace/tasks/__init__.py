@@ -3,13 +3,24 @@
 from types import MappingProxyType
 
 from opspace.tasks.activations import ActivationProduct as ActivationProduct
+from opspace.tasks.activations import ActivationUnion as ActivationUnion
 from opspace.tasks.activations import DistanceBuffer as DistanceBuffer
 from opspace.tasks.activations import JointBuffer as JointBuffer
 from opspace.tasks.angular_momentum import AngularMomentumTask as AngularMomentumTask
+from opspace.tasks.collision_avoidance import CollisionAvoidance as CollisionAvoidance
 from opspace.tasks.com import ComTask as ComTask
+from opspace.tasks.contact import Contact as Contact
+from opspace.tasks.contact import GiveWay as GiveWay
+from opspace.tasks.force import ForceTask as ForceTask
+from opspace.tasks.force import Touch as Touch
+from opspace.tasks.impedance import ImpedanceTask as ImpedanceTask
 from opspace.tasks.joint import JointTask as JointTask
 from opspace.tasks.joint_limits import JointLimits as JointLimits
 from opspace.tasks.kinds import TaskKind
+from opspace.tasks.obstacles import Ball as Ball
+from opspace.tasks.obstacles import Box as Box
+from opspace.tasks.obstacles import Capsule as Capsule
+from opspace.tasks.obstacles import HalfSpace as HalfSpace
 from opspace.tasks.orientation import OrientationTask as OrientationTask
 from opspace.tasks.pose import PoseTask as PoseTask
 from opspace.tasks.position import PositionTask as PositionTask

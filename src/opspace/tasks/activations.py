@@ -138,6 +138,31 @@ class ActivationProduct:
         return product
 
 
+class ActivationUnion:
+    """The task is there as far as any of several activations wants it, 1 − Π (1 − h).
+
+    As smooth as they are. Of `Contact` and a `DistanceBuffer` it inserts a force task before the
+    touch, and keeps it where something is touched that was not expected.
+
+    Args:
+        parts: Functions (robot, t) -> [0, 1].
+    """
+
+    def __init__(self, *parts: Callable[[Robot, float], float]) -> None:
+        self.parts = parts
+
+    def bind(self, robot: Robot) -> None:
+        """Check the names that the parts use."""
+        ActivationProduct(*self.parts).bind(robot)
+
+    def __call__(self, robot: Robot, t: float) -> float:
+        """Evaluate the union at the robot's present state."""
+        absent = 1.0
+        for part in self.parts:
+            absent *= 1.0 - part(robot, t)
+        return 1.0 - absent
+
+
 def own_activation(task: Task, robot: Robot, t: float) -> float:
     """Evaluate the activation that the user gave a task, 1 where there is none.
 

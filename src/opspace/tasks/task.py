@@ -27,12 +27,15 @@ class TaskTerms:
         drift: (m,) J̇ v, task acceleration at zero joint acceleration.
         acceleration: (m,) commanded acceleration f* of Eq. 24.
         error: (m,) x_d − x; of an orientation the rotation vector from R to R_d.
+        torque: (n,) balanced torque g, N·m, given beside the rows and scaled with the task's
+            activation: what the world answers it with is no disturbance of any task. None is none.
     """
 
     J: Array
     drift: Array
     acceleration: Array
     error: Array
+    torque: Array | None = None
 
 
 class LastChange:
@@ -129,6 +132,11 @@ class Task(KnownAttributes, ABC):
         """
         del pause
         self.reset()
+
+    @property
+    def error_units(self) -> tuple[str, ...]:
+        """Unit of each row of the error that a tick reports."""
+        return self.units
 
     def row_axes(self, robot: Robot) -> Array | None:
         """Return the motion in world axes that each row is about, to be drawn.

@@ -80,7 +80,7 @@ def positive(value: float, what: str) -> float:
     return number
 
 
-def finite(value: float, what: str) -> float:
+def finite(value: ArrayLike, what: str) -> float:
     """Return a finite number.
 
     Args:
@@ -94,7 +94,7 @@ def finite(value: float, what: str) -> float:
         InputError: Not a number or not finite.
     """
     try:
-        number = float(value)
+        number = float(value)  # pyright: ignore[reportArgumentType] - or it is refused
     except (TypeError, ValueError, OverflowError):
         raise InputError(f"{what} must be a number, not {shown(value)}") from None
     if not math.isfinite(number):

@@ -44,7 +44,7 @@ class ContactTerms(NamedTuple):
     point: Array
 
 
-class Contact(KnownAttributes, ABC):
+class GroundContact(KnownAttributes, ABC):
     """A place at which the robot touches something that does not move.
 
     The contact is a motion, J q̈ = −k_d J v − J̇ v, above every task, and a force λ inside its cone.

@@ -1,0 +1,105 @@
+"""Distances of one tick: the rows of a guard, and how fast each may shrink."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from opspace.law.convex import Bodies, DistanceRows, Points, distance_rows
+from opspace.law.scalars import admissible_command
+from opspace.robots.protocol import Robot
+from opspace.tasks.collision_avoidance import CollisionAvoidance
+from opspace.tasks.distance_layout import DistanceLayout
+
+
+class DistanceTerms(NamedTuple):
+    """The distances of one tick, and the bounds G q̈ ≤ most that keep them.
+
+    Attributes:
+        layout: Whose distances they are.
+        distance: (rows,) between the shapes, m.
+        G: (rows, n) by how much joint accelerations let each shrink faster.
+        most: (rows,) m/s².
+    """
+
+    layout: DistanceLayout
+    distance: np.ndarray
+    G: np.ndarray
+    most: np.ndarray
+
+
+def distance_terms(guard: CollisionAvoidance, robot: Robot, t: float) -> DistanceTerms:
+    """Evaluate all distances of a guard at the robot's present state and at time t, s."""
+    layout = guard.layout()
+    rows = rows_of(layout, robot, t)
+    balls, sets = layout.rows[:, 0], layout.rows[:, 1]
+    distance = rows.distance - layout.ball_radius[balls] - layout.set_radius[sets]
+    D = distance - guard.margin
+    most = [
+        admissible_command(d, -rate, guard.brake, np.inf, guard.k1, guard.k2, 0.0, 0.0) + drift
+        for d, rate, drift in zip(D.tolist(), rows.rate.tolist(), rows.drift.tolist(), strict=True)
+    ]
+    return DistanceTerms(layout, distance, -rows.G, np.array(most))
+
+
+def rows_of(layout: DistanceLayout, robot: Robot, t: float) -> DistanceRows:
+    """Evaluate the distances of centres of balls to sets that are not grown by their radii."""
+    points = _points(layout, robot)
+    bodies = _bodies(layout, robot, t)
+    balls, sets = layout.rows[:, 0], layout.rows[:, 1]
+    return distance_rows(
+        Points._make(part[balls] for part in points),
+        Bodies._make(part[sets] for part in bodies),
+        layout.lower[sets],
+        layout.upper[sets],
+    )
+
+
+def _points(layout: DistanceLayout, robot: Robot) -> Points:
+    """Motion of the centres of all balls."""
+    count = layout.ball_frame.size
+    none = np.zeros((count, 3))
+    found = Points(none.copy(), none.copy(), none.copy(), np.zeros((count, 3, robot.nv)))
+    for i, (frame, centre) in enumerate(zip(layout.ball_frame, layout.ball_centre, strict=True)):
+        position, V, A, J = _moved(robot, int(frame), robot.rotation(int(frame)) @ centre)
+        found.position[i], found.velocity[i] = position, V[:3]
+        found.acceleration[i], found.J[i] = A[:3], J[:3]
+    return found
+
+
+def _bodies(layout: DistanceLayout, robot: Robot, t: float) -> Bodies:
+    """Motion of all sets, those of links and those of obstacles."""
+    count, n = layout.set_frame.size, robot.nv
+    found = Bodies(
+        np.zeros((count, 3, 3)),
+        np.zeros((count, 3)),
+        np.zeros((count, 6)),
+        np.zeros((count, 6)),
+        np.zeros((count, 6, n)),
+    )
+    links = count - len(layout.obstacles)
+    for i in range(links):
+        frame = int(layout.set_frame[i])
+        R = robot.rotation(frame)
+        arm = R @ layout.set_position[i]
+        found.rotation[i] = R @ layout.set_rotation[i]
+        found.position[i], found.velocity[i], found.acceleration[i], found.J[i] = _moved(
+            robot, frame, arm
+        )
+    for i, obstacle in enumerate(layout.obstacles, links):
+        found.rotation[i], found.position[i], found.velocity[i] = obstacle.placing(t)
+    return found
+
+
+def _moved(
+    robot: Robot, frame: int, arm: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Position, velocity, drift and Jacobian of a point of a frame's body, ``arm`` from its origin."""
+    J = robot.jacobian(frame).copy()
+    V, A = robot.velocity(frame).copy(), robot.drift(frame).copy()
+    spin = V[3:]
+    J[:3] -= np.cross(arm, J[3:], axisb=0, axisc=0)
+    A[:3] += np.cross(A[3:], arm) + np.cross(spin, np.cross(spin, arm))
+    V[:3] += np.cross(spin, arm)
+    return robot.position(frame) + arm, V, A, J

@@ -1,0 +1,130 @@
+"""What a scenario file can say about what a robot must not touch."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from opspace.scenario.fields import Checked, Entry, Number, listed, problem, shown
+from opspace.scenario.targets import Point, Quaternion
+from opspace.tasks import Ball, Box, Capsule, CollisionAvoidance, HalfSpace
+from opspace.tasks.obstacles import Obstacle
+from opspace.tasks.references.sample import Sample
+
+if TYPE_CHECKING:
+    from typing_extensions import Self
+
+Positive = Annotated[float, Number("m", above=0.0)]
+NEEDED = {
+    "ball": ("radius",),
+    "capsule": ("radius", "length"),
+    "box": ("size",),
+    "half-space": ("normal",),
+}
+"""What each shape has beside its place."""
+
+
+def _pairs(value: Any) -> str | list[tuple[str, str]]:
+    """Read which links are kept apart."""
+    if isinstance(value, str):
+        if value not in ("auto", "none"):
+            raise problem(f"must be {listed(('auto', 'none'))} or pairs of links", None)
+        return value
+    if not isinstance(value, list) or not all(
+        isinstance(pair, list | tuple) and len(pair) == 2 for pair in value
+    ):
+        raise problem(f"must be a list of pairs of links, not {shown(value)}")
+    return [(str(one), str(two)) for one, two in value]
+
+
+class Straight:
+    """A straight line in time.
+
+    Args:
+        start: (3,) where it is at time 0, m.
+        velocity: (3,) m/s.
+    """
+
+    def __init__(self, start: tuple[float, ...], velocity: tuple[float, ...]) -> None:
+        self.start, self.velocity = np.array(start), np.array(velocity)
+
+    def __call__(self, t: float) -> Sample:
+        """Return where it is at time t, s."""
+        return Sample(self.start + self.velocity * t, self.velocity, np.zeros(3))
+
+
+class ObstacleEntry(Entry):
+    """Something that the robot must not touch."""
+
+    shape: Literal["ball", "capsule", "box", "half-space"] = Field(description="what it is")
+    radius: Positive | None = Field(default=None, description="of a ball or a capsule [m]")
+    length: Positive | None = Field(
+        default=None, description="of a capsule along its z axis, without its ends [m]"
+    )
+    size: Annotated[tuple[float, ...], Number("m", size=3, above=0.0)] | None = Field(
+        default=None, description="sides of a box [m]"
+    )
+    normal: Annotated[tuple[float, ...], Number("1", size=3)] | None = Field(
+        default=None, description="out of a half-space, towards where the robot may be"
+    )
+    position: Point = Field(description="of its middle; of a half-space a point of its plane [m]")
+    orientation: Quaternion = Field(
+        default=(1.0, 0.0, 0.0, 0.0), description="its axes, quaternion wxyz"
+    )
+    velocity: Annotated[tuple[float, ...], Number("m/s", size=3)] = Field(
+        default=(0.0, 0.0, 0.0), description="with which it moves from its position on [m/s]"
+    )
+    ignore: list[str] = Field(default_factory=list, description="links that may touch it")
+
+    @model_validator(mode="after")
+    def _check_shape(self) -> Self:
+        for key in ("radius", "length", "size", "normal"):
+            needed = key in NEEDED[self.shape]
+            if needed and getattr(self, key) is None:
+                raise problem(f"is needed for a {self.shape}", key)
+            if not needed and getattr(self, key) is not None:
+                raise problem(f"is not something that a {self.shape} has", key)
+        return self
+
+    def build(self, name: str) -> Obstacle:
+        """Make the obstacle."""
+        place: Any = Straight(self.position, self.velocity) if any(self.velocity) else self.position
+        given = {"name": name, "ignore": self.ignore}
+        if self.shape == "ball":
+            return Ball(self.radius or 0.0, place, **given)
+        if self.shape == "capsule":
+            size = self.radius or 0.0, self.length or 0.0
+            return Capsule(*size, place, self.orientation, **given)
+        if self.shape == "box":
+            return Box(self.size or (), place, self.orientation, **given)
+        return HalfSpace(place, self.normal or (), **given)
+
+
+class CollisionsEntry(Entry):
+    """What the robot is kept away from."""
+
+    margin: Annotated[float, Number("m", at_least=0.0)] = Field(
+        default=0.01, description="distance that is kept [m]"
+    )
+    brake: Annotated[float, Number("m/s²", above=0.0)] = Field(
+        default=4.0, description="with which distances can be counted on to stop shrinking [m/s²]"
+    )
+    pairs: Annotated[Any, Checked(_pairs)] = Field(
+        default="auto", description="links that are kept apart: auto, none, or pairs of frames"
+    )
+    obstacles: dict[str, ObstacleEntry] = Field(
+        default_factory=dict, description="name: what is in the workspace"
+    )
+
+    def build(self) -> CollisionAvoidance:
+        """Make the guard.
+
+        Raises:
+            InputError: A number that cannot be used.
+        """
+        obstacles = [entry.build(name) for name, entry in self.obstacles.items()]
+        return CollisionAvoidance(
+            *obstacles, margin=self.margin, brake=self.brake, pairs=self.pairs
+        )

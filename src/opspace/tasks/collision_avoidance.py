@@ -1,0 +1,202 @@
+"""What a robot is kept away from: itself, and what stands or moves in its workspace."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+
+from opspace.errors import InputError, unknown_name
+from opspace.law.scalars import RETURN_SPEED
+from opspace.robots.protocol import Robot
+from opspace.robots.shapes import LinkCapsule, joints_that_move, shapes_of
+from opspace.robots.touching import Pairs, pairs_of
+from opspace.tasks.distance_layout import DistanceLayout, lay_out
+from opspace.tasks.obstacles import Obstacle
+from opspace.tasks.task import CHANGES
+from opspace.tasks.validation import finite, positive
+
+SHAPES = ("model",)
+PAIRS = ("auto", "none")
+
+
+class CollisionAvoidance:
+    """Keeps a robot from touching itself and obstacles, in every tick, whatever the tasks ask for.
+
+    Every link is a capsule, covered with balls; every ball keeps its distance ρ to every convex set, a
+    link or an obstacle, that its link can touch. As for a joint limit (`opspace.JointLimits`) the
+    distance D = ρ − margin may shrink only so fast that the arm still stops:
+
+        −ρ̈ ≤ −v v_adm'(D) + k₂ (v_adm(D) − v),   v = −ρ̇
+
+    and the controller answers the acceleration nearest to what the stack wants among those that no
+    pair forbids, in the projection that keeps joints and motors, too.
+
+    Args:
+        obstacles: What is there from the start.
+        margin: Distance that is kept, m.
+        shapes: ``"model"``, the collision geometry of the robot's file; or capsules of one's own.
+        pairs: Links that are kept from each other: ``"auto"`` chooses, see
+            `opspace.robots.touching.pairs_of`, ``"none"`` is none, or pairs of frames.
+        brake: Acceleration with which distances can be counted on to stop shrinking, m/s².
+
+    Raises:
+        InputError: A number that cannot be used, or two obstacles of one name.
+        UnknownNameError: An unknown choice; at binding a frame that the robot does not have.
+    """
+
+    k1 = 10.0
+    k2 = 20.0
+
+    def __init__(
+        self,
+        *obstacles: Obstacle,
+        margin: float = 0.01,
+        shapes: str | Sequence[LinkCapsule] = "model",
+        pairs: str | Iterable[tuple[str, str]] = "auto",
+        brake: float = 4.0,
+    ) -> None:
+        self.margin = finite(margin, "the margin of collisions")
+        if self.margin < 0.0:
+            raise InputError(f"the margin of collisions must be at least 0, not {margin}")
+        self.brake = positive(brake, "the brake of collisions")
+        if isinstance(shapes, str) and shapes not in SHAPES:
+            raise unknown_name("shapes", shapes, SHAPES)
+        if isinstance(pairs, str) and pairs not in PAIRS:
+            raise unknown_name("pairs", pairs, PAIRS)
+        self._wanted_shapes = shapes if isinstance(shapes, str) else tuple(shapes)
+        self._wanted_pairs = pairs if isinstance(pairs, str) else tuple(pairs)
+        self._robot: Robot | None = None
+        self._moved: Mapping[str, frozenset[int]] = {}
+        self.shapes: tuple[LinkCapsule, ...] = ()
+        self.pairs: tuple[tuple[str, str], ...] = ()
+        self.left_out: Mapping[tuple[str, str], str] = {}
+        self._obstacles: tuple[Obstacle, ...] = ()
+        self._layout: DistanceLayout | None = None
+        self.add(*obstacles)
+
+    def __repr__(self) -> str:
+        names = ", ".join(obstacle.name for obstacle in self._obstacles) or "none"
+        return (
+            f"{type(self).__name__}(margin={self.margin:g}, {len(self.shapes)} shapes, "
+            f"{len(self.pairs)} pairs of links, obstacles: {names})"
+        )
+
+    @property
+    def obstacles(self) -> tuple[Obstacle, ...]:
+        """The obstacles."""
+        return self._obstacles
+
+    def __getitem__(self, name: str) -> Obstacle:
+        """Return an obstacle by its name.
+
+        Raises:
+            UnknownNameError: There is none.
+        """
+        for obstacle in self._obstacles:
+            if obstacle.name == name:
+                return obstacle
+        raise unknown_name("obstacle", name, [obstacle.name for obstacle in self._obstacles])
+
+    def add(self, *obstacles: Obstacle) -> None:
+        """Let there be more obstacles from the next tick on; from any thread.
+
+        Nothing steps if they are not near: one that the arm is about to touch is a bound at once.
+
+        Raises:
+            InputError: No obstacle, or one of a name that is taken.
+            UnknownNameError: It ignores a link that the robot does not have.
+        """
+        names = {obstacle.name for obstacle in self._obstacles}
+        for obstacle in obstacles:
+            if not isinstance(obstacle, Obstacle):
+                raise InputError(
+                    f"a guard takes Ball, Box, Capsule and HalfSpace, not {type(obstacle).__name__}"
+                )
+            if obstacle.name in names:
+                raise InputError(f"there is an obstacle {obstacle.name!r} already")
+            names.add(obstacle.name)
+            self._check_ignored(obstacle)
+        self._change((*self._obstacles, *obstacles))
+
+    def remove(self, *names: str) -> None:
+        """Forget obstacles from the next tick on; from any thread.
+
+        Raises:
+            UnknownNameError: There is none of that name.
+        """
+        gone = [self[name] for name in names]
+        self._change(tuple(o for o in self._obstacles if o not in gone))
+
+    def clearance_lost(self, speed: float) -> float:
+        """How much nearer than the margin an obstacle comes that hides its speed, m.
+
+        The arm stays where it retreats as fast as the obstacle follows, u: at D < 0 with
+        −v_adm(D) = u (1 + v_adm'(D)/k₂), v_adm and its slope those of joints beyond their limits.
+
+        Args:
+            speed: u, m/s.
+
+        Returns:
+            −D; inf from the speed on with which it retreats at most, `opspace.law.scalars.RETURN_SPEED`.
+        """
+        share = abs(finite(speed, "the speed of an obstacle")) / RETURN_SPEED
+        if share >= 1.0:
+            return math.inf
+        slope = share * self.k1 / self.k2
+        if slope == 0.0:
+            return 0.0
+        y = (math.sqrt(1.0 + 4.0 * slope * (share + slope)) - 1.0) / (2.0 * slope)
+        return RETURN_SPEED / self.k1 * math.atanh(y)
+
+    def bind(self, robot: Robot) -> None:
+        """Find the links of a robot, their shapes and the pairs that are to be watched.
+
+        Raises:
+            InputError: It is bound to another robot.
+            ModelError: The robot's file has no shapes.
+            UnknownNameError: A frame that the robot does not have.
+        """
+        if self._robot is robot:
+            return
+        if self._robot is not None:
+            raise InputError(f"this guard is for {self._robot.name!r} already: make another one")
+        given = self._wanted_shapes
+        shapes = shapes_of(robot) if isinstance(given, str) else given
+        frames = list(dict.fromkeys(shape.frame for shape in shapes))
+        self.pairs, self.left_out = self._chosen(robot, shapes, frames)
+        self._moved = dict(zip(frames, joints_that_move(robot, frames), strict=True))
+        self.shapes, self._robot = tuple(shapes), robot
+        for obstacle in self._obstacles:
+            self._check_ignored(obstacle)
+
+    def _chosen(self, robot: Robot, shapes: Sequence[LinkCapsule], frames: Sequence[str]) -> Pairs:
+        wanted = self._wanted_pairs
+        if wanted == "auto":
+            return pairs_of(robot, shapes, self.margin)
+        if isinstance(wanted, str):
+            return Pairs((), {})
+        for name in {name for pair in wanted for name in pair}:
+            if name not in frames:
+                raise unknown_name("link with a shape", name, frames)
+        return Pairs(wanted, {})
+
+    def layout(self) -> DistanceLayout:
+        """Lay out the present obstacles; the same object as long as none comes or goes."""
+        found = self._layout
+        obstacles = self._obstacles
+        if found is None or found.obstacles is not obstacles:
+            assert self._robot is not None
+            found = lay_out(self._robot, self.shapes, self._moved, self.pairs, obstacles)
+            self._layout = found
+        return found
+
+    def _change(self, obstacles: tuple[Obstacle, ...]) -> None:
+        self._obstacles = obstacles
+        CHANGES.last = object()
+
+    def _check_ignored(self, obstacle: Obstacle) -> None:
+        if self._robot is None:
+            return
+        for name in obstacle.ignore:
+            if name not in self._moved:
+                raise unknown_name(f"link that {obstacle.name!r} ignores", name, self._moved)

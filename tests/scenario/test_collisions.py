@@ -1,0 +1,88 @@
+"""Obstacles in scenario files."""
+
+import numpy as np
+import pytest
+
+import opspace as osc
+from opspace.runs.run import run_scenario
+from opspace.scenario.build import build
+from opspace.scenario.load import load_scenario, scenario_from
+
+BALL = {"shape": "ball", "radius": 0.1, "position": [2.0, 0.0, 0.0], "velocity": [0.0, 0.5, 0.0]}
+WALL = {"shape": "half-space", "normal": [-1.0, 0.0, 0.0], "position": [2.0, 0.0, 0.0]}
+
+
+def scenario(obstacles, **more):
+    return scenario_from(
+        {
+            "robot": "puma560",
+            "duration": 0.05,
+            "tasks": {"posture": {"type": "posture", "level": 0}},
+            "collisions": {"pairs": "none", "obstacles": obstacles, **more},
+        }
+    )
+
+
+def test_obstacles_are_built_with_the_names_of_the_file_and_move_on():
+    built = build(scenario({"ball": BALL, "wall": {**WALL, "ignore": ["link1"]}}, margin=0.02))
+    guard = built.controller.collisions
+    assert guard.margin == 0.02
+    q, v = built.robot.q_reference, np.zeros(6)
+    seen = [built.controller.step(t, q, v).distances["link6/ball"].distance for t in (0.0, 1.0)]
+    assert guard["ball"].position == pytest.approx([2.0, 0.5, 0.0])
+    assert guard["ball"].velocity[:3] == pytest.approx([0.0, 0.5, 0.0])
+    assert seen[0] != seen[1]
+    assert "link1/wall" not in built.controller.step(2.0, q, v).distances
+    assert build(scenario({"ball": BALL})).controller.collisions is not guard
+
+
+@pytest.mark.parametrize(
+    ("entry", "said"),
+    [
+        ({**BALL, "size": [1, 1, 1]}, "not something that a ball has"),
+        ({"shape": "box", "position": [0, 0, 0]}, "needed for a box"),
+        ({**BALL, "radius": -1.0}, "radius"),
+        ({**BALL, "shape": "cone"}, "shape"),
+        ({**WALL, "normal": [0.0, 0.0, 0.0]}, "must not be zero"),
+        ({**BALL, "ignore": ["hand"]}, "hand"),
+    ],
+)
+def test_what_a_shape_does_not_have_is_refused_with_its_key(entry, said):
+    with pytest.raises(osc.OpspaceError, match=said) as error:
+        build(scenario({"thing": entry}))
+    assert "collisions" in str(error.value)
+
+
+@pytest.mark.parametrize("name", ["table", "self-fold", "moving-ball", "gap"])
+def test_shipped_scenes_can_be_built(name):
+    assert build(load_scenario(name)).controller.collisions.layout().rows.size
+
+
+def test_a_recording_tells_the_nearest_pair_and_is_the_same_again(tmp_path):
+    ball = {**BALL, "position": [0.9, -0.15, 0.8], "velocity": [-0.5, 0.0, 0.0]}
+    run_scenario(scenario({"ball": ball}), tmp_path / "run")
+    recording = osc.load(tmp_path / "run")
+    least = recording["distances/least"]
+    assert np.all(np.diff(least) < 0.0)
+    again = build(scenario({"ball": ball}))
+    assert osc.replay(recording, again.controller).gap == 0.0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["table", "self-fold", "moving-ball", "gap"])
+def test_in_shipped_scenes_nothing_comes_nearer_than_the_margin(name):
+    built = build(load_scenario(name))
+    least, happened = [], osc.Status.OK
+
+    class Look:
+        def step(self, t, q, v):
+            nonlocal happened
+            command = built.controller.step(t, q, v)
+            least.append(next(iter(command.distances.values())).distance)
+            happened |= command.status
+            return command
+
+    osc.simulate(built.plant, Look(), built.scenario.duration)
+    assert min(least) >= 0.01 - 2e-4
+    assert osc.Status.COLLISION in happened
+    assert osc.Status.COLLISION_LOST not in happened
