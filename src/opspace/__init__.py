@@ -9,10 +9,14 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from opspace.command import Command as Command
+    from opspace.command import ContactStatus as ContactStatus
     from opspace.command import Distance as Distance
     from opspace.command import LevelStatus as LevelStatus
     from opspace.command import Status as Status
     from opspace.command import TaskStatus as TaskStatus
+    from opspace.contacts import GroundContact as GroundContact
+    from opspace.contacts import PointContact as PointContact
+    from opspace.contacts import SoleContact as SoleContact
     from opspace.controller import Controller as Controller
     from opspace.errors import InputError as InputError
     from opspace.errors import MissingExtraError as MissingExtraError
@@ -55,11 +59,14 @@ if TYPE_CHECKING:
     from opspace.robots import available_robots as available_robots
     from opspace.robots import load_robot as load_robot
     from opspace.robots.shapes import LinkCapsule as LinkCapsule
+    from opspace.sim import Ground as Ground
     from opspace.sim import Plant as Plant
     from opspace.sim import Surface as Surface
+    from opspace.sim import Wall as Wall
     from opspace.stack import Stack as Stack
     from opspace.tasks import ActivationProduct as ActivationProduct
     from opspace.tasks import ActivationUnion as ActivationUnion
+    from opspace.tasks import AngularMomentumTask as AngularMomentumTask
     from opspace.tasks import Ball as Ball
     from opspace.tasks import Box as Box
     from opspace.tasks import Capsule as Capsule
@@ -100,7 +107,8 @@ if TYPE_CHECKING:
     from opspace.view import Viewer as Viewer
 
 _NAMES = {
-    "opspace.command": "Command Distance LevelStatus Status TaskStatus",
+    "opspace.command": "Command ContactStatus Distance LevelStatus Status TaskStatus",
+    "opspace.contacts": "GroundContact PointContact SoleContact",
     "opspace.controller": "Controller",
     "opspace.errors": (
         "InputError MissingExtraError ModelError ModelWarning OpspaceError RecordingError ScenarioError "
@@ -119,10 +127,11 @@ _NAMES = {
     "opspace.loop": "AnyPlant Observer Outcome Stepping StopRule simulate",
     "opspace.plan.calibration": "Calibration",
     "opspace.plan.scales": "Singularity",
-    "opspace.sim": "Plant Surface",
+    "opspace.sim": "Ground Plant Surface Wall",
     "opspace.stack": "Stack",
     "opspace.tasks": (
-        "ActivationProduct ActivationUnion Ball Box Capsule Chain Circle CollisionAvoidance "
+        "ActivationProduct ActivationUnion AngularMomentumTask Ball Box Capsule Chain Circle "
+        "CollisionAvoidance "
         "ComTask Constant Contact DistanceBuffer ForceTask GiveWay HalfSpace ImpedanceTask "
         "JerkLimited JointBuffer JointLimits JointTask MinimumJerk OrientationJerkLimited "
         "OrientationMinimumJerk OrientationTask PoseReference PoseTask PositionTask PostureTask "

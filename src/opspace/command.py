@@ -42,6 +42,13 @@ class Status(IntFlag):
     """A pair of bodies is kept from coming nearer: tasks get less than they ask for."""
     COLLISION_LOST = 8192
     """No torque of the motors keeps every pair of bodies apart, and the excess is as small as can be."""
+    GIVEN_UP = 16384
+    """Contacts, motors or joints do not allow what the tasks want, and more than a thousandth of the
+    weight was given up."""
+    CONTACT_WAITS = 32768
+    """A contact that is to go stays, because the others cannot carry what it does."""
+    NOT_BALANCED = 65536
+    """What was given up is more than 0.3 weights: the robot will fall if this lasts."""
     FAULT = 8
     """No finite torque was found; the command is bias compensation with damping."""
 
@@ -94,6 +101,31 @@ class LevelStatus:
 
 
 @dataclass(frozen=True, slots=True)
+class ContactStatus:
+    """One contact in one tick.
+
+    Attributes:
+        progress: How far it has come, 0 out to 1 in.
+        motion: h_m, activation of its motion.
+        activation: h_f, activation of its force.
+        force: (3,) force on the robot that the command plans, in world axes, N.
+        moment: (3,) moment about the contact's point, in world axes, N·m; zero for a point.
+        cop: (2,) centre of pressure in the contact's axes, m; zero where nothing presses.
+        cone_use: Part of its cone that the force uses, 1 at the edge.
+        waiting: Whether it is to go and stays because the others cannot carry.
+    """
+
+    progress: float
+    motion: float
+    activation: float
+    force: np.ndarray
+    moment: np.ndarray
+    cop: np.ndarray
+    cone_use: float
+    waiting: bool
+
+
+@dataclass(frozen=True, slots=True)
 class Distance:
     """Two bodies in one tick.
 
@@ -130,6 +162,14 @@ class Report(Protocol):
         """Activation of the joint-limit tasks that are not at 0, by "joint/side"."""
         ...
 
+    @property
+    def contacts(self) -> Mapping[str, ContactStatus]:
+        """Status of each contact by name."""
+        ...
+
+
+NO_CONTACTS: Mapping[str, ContactStatus] = {}
+
 
 @dataclass(frozen=True, slots=True)
 class Found:
@@ -139,6 +179,7 @@ class Found:
     levels: tuple[LevelStatus, ...]
     limits: Mapping[str, float]
     distances: Mapping[str, Distance] = field(default_factory=dict)
+    contacts: Mapping[str, ContactStatus] = field(default_factory=dict[str, ContactStatus])
 
 
 class Command(NamedTuple):
@@ -177,6 +218,11 @@ class Command(NamedTuple):
     def limits(self) -> Mapping[str, float]:
         """Activation of the joint-limit tasks that are not at 0, by "joint/side"."""
         return self.report.limits
+
+    @property
+    def contacts(self) -> Mapping[str, ContactStatus]:
+        """Status of each contact by name."""
+        return self.report.contacts
 
     @property
     def distances(self) -> Mapping[str, Distance]:

@@ -185,11 +185,6 @@ CASES = {
         scene(motors='<motor joint="j1" ctrlrange="0 90"/><motor joint="j2"/>'),
         refused="motors without torque in one direction or both: j1",
     ),
-    "humanoid": Case(
-        fingers(),
-        refused="not fully actuated (floating_base/0",
-        options={"floating_base": True},
-    ),
     "ball joint with a motor": Case(
         scene(hand='<body name="w" pos=".3 0 0"><joint name="swivel" type="ball"/>'
               '<geom size=".03"/></body>', motors=MOTORS + '<motor joint="swivel"/>'),

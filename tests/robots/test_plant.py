@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from opspace.robots import load_robot
-from opspace.robots.mujoco_model import mujoco_model
+from opspace.robots.mujoco_model import model_of, mujoco_model
 from tests.robots.samples import NAMES, URDF, random_state
 
 
@@ -17,7 +17,7 @@ from tests.robots.samples import NAMES, URDF, random_state
 def test_the_plant_accelerates_as_the_robot_says(name: str) -> None:
     robot = load_robot(name)
     assert robot.source is not None
-    model = mujoco_model(robot.source, robot.floating_base, robot.locked_joints)
+    model = model_of(robot)
     assert (model.nq, model.nv) == (robot.nq, robot.nv)
     data = mujoco.MjData(model)
     q, v = random_state(robot, np.random.default_rng(40))

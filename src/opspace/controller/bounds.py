@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from types import MappingProxyType
+from typing import NamedTuple
 
 import numpy as np
 
-from opspace.command import Status
+from opspace.command import NO_CONTACTS, ContactStatus, Status
 from opspace.controller.collisions import DistanceTerms
 from opspace.controller.limit_task_sets import LimitTerms
-from opspace.law import BROKEN, LOST, Nearest, excess, excess_of_rows, nearest_acceleration
+from opspace.law import BROKEN, LOST, excess, excess_of_rows, nearest_acceleration
 from opspace.robots.protocol import Robot
 
 
@@ -88,9 +90,31 @@ class Bounds:
         return excess_of_rows(acceleration, self.distances.G, self.distances.most)
 
 
-def realise(
-    bounds: Bounds, tau: np.ndarray, metric: Callable[[], np.ndarray]
-) -> tuple[np.ndarray, Status, dict[str, float], np.ndarray]:
+NOTHING = np.zeros(0)
+
+
+class Kept(NamedTuple):
+    """A torque that keeps what it can.
+
+    Attributes:
+        tau: (n,) N·m.
+        status: What happened.
+        limits: By name how much each joint limit acts: the acceleration that it takes from its joint,
+            as a part of its margin, at most 1.
+        taken: What each distance takes from how fast it shrinks, (rows,) m/s².
+        contacts: What each contact carries.
+        hindrance: What contacts could not carry, as a multiple of what a contact that leaves may cost.
+    """
+
+    tau: np.ndarray
+    status: Status = Status.OK
+    limits: Mapping[str, float] = MappingProxyType({})
+    taken: np.ndarray = NOTHING
+    contacts: Mapping[str, ContactStatus] = NO_CONTACTS
+    hindrance: float = 0.0
+
+
+def realise(bounds: Bounds, tau: np.ndarray, metric: Callable[[], np.ndarray]) -> Kept:
     """Replace a torque by the nearest one with which no joint, motor or distance does more than it may.
 
     Args:
@@ -99,16 +123,15 @@ def realise(
         metric: Gives W, in which "near" is measured; asked only where something is outside.
 
     Returns:
-        The torque, what happened, by name how much each limit acts: the acceleration that it takes
-        from its joint, as a part of its margin, at most 1; and what each distance takes from how fast
-        it shrinks, (rows,) m/s².
+        The torque and what happened.
     """
     M, bias = bounds.M, bounds.bias
     acceleration = np.linalg.solve(M, tau - bias)
     near = bounds.distances
     if not bounds.broken(tau, acceleration):
         nothing = np.zeros(0 if near is None else near.most.size)
-        return tau, Status.LIMIT_LOST if bounds.lost(acceleration) else Status.OK, {}, nothing
+        lost = Status.LIMIT_LOST if bounds.lost(acceleration) else Status.OK
+        return Kept(tau, lost, taken=nothing)
     found = nearest_acceleration(
         np.linalg.cholesky(M),
         metric(),
@@ -130,7 +153,8 @@ def realise(
         status |= Status.COLLISION
     if bounds.approach(found.acceleration) > LOST:
         status |= Status.COLLISION_LOST
-    return tau, status, _acting(bounds.terms, found), found.rows
+    limits = acting(bounds.terms, found.upper, found.lower)
+    return Kept(tau, status, limits, found.rows)
 
 
 def change_within_tick(
@@ -154,10 +178,18 @@ def change_within_tick(
     return later - acceleration
 
 
-def _acting(terms: Sequence[LimitTerms], found: Nearest) -> dict[str, float]:
-    taken = [
-        (found.upper if term.side.sign > 0.0 else found.lower)[term.side.index] for term in terms
-    ]
+def acting(terms: Sequence[LimitTerms], upper: np.ndarray, lower: np.ndarray) -> dict[str, float]:
+    """Tell by name how much each limit acts.
+
+    Args:
+        terms: Joint limits that are bounds.
+        upper: (n,) by how much each upper bound lowers its joint's acceleration, rad/s².
+        lower: (n,) the same of each lower bound.
+
+    Returns:
+        The acceleration that a limit takes from its joint, as a part of its margin, at most 1.
+    """
+    taken = [(upper if term.side.sign > 0.0 else lower)[term.side.index] for term in terms]
     return {
         term.side.name: min(float(part) / term.margin, 1.0)
         for term, part in zip(terms, taken, strict=True)

@@ -276,6 +276,8 @@ class Controller(ReferenceController):
 
     def _not_compiled(self) -> str:
         """Name what somebody wrote that compiled code cannot call, empty where there is nothing."""
+        if self._base:
+            return "the readable tick of a floating base"
         limits = self.stack.limits
         if limits is not None and limits.overridden:
             return f"the law of {type(limits).__name__}"

@@ -9,9 +9,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from opspace.command import Command, Found, Status
+from opspace.contacts import GroundContact
 from opspace.controller.changing_payload import Loading
 from opspace.controller.disturbance import DisturbanceObserver
-from opspace.controller.drivable import check_drivable
+from opspace.controller.drivable import base_of, check_drivable
 from opspace.controller.handover import Handover
 from opspace.controller.integral import IntegralAction
 from opspace.controller.rates import check_damping, check_limits, with_period
@@ -60,7 +61,9 @@ class ReferenceController:
         bias: ``"joint"`` (default) or ``"task"``, see `BIASES`.
         gravity: Who adds the torque that holds the weight, ``"controller"`` (default) or ``"robot"``,
             see `GRAVITIES`.
-        singularity: Buffer for singular directions; None switches their handling off.
+        singularity: Buffer for singular directions; None switches their handling off, and so does a
+            floating base where nothing else is given: what is usual in flight says nothing about a
+            robot that stands.
         damping: Joint damping in the motions that no task uses, 1/s; also what a joint is braked
             with in case of a fault. Unused where a posture task covers every joint.
         torque_limits: What happens to a torque above the motors' limits, see `TORQUE_LIMITS`.
@@ -75,8 +78,8 @@ class ReferenceController:
             `opspace.controller.stages.Question` for what it is asked.
 
     Raises:
-        InputError: The robot is not fully actuated, or an option cannot be used; the joint limits or
-            the damping of a task need a shorter ``period``.
+        InputError: A joint behind the base has no motor, or an option cannot be used; the joint
+            limits or the damping of a task need a shorter ``period``.
         UnknownNameError: A task names a frame or joint that the robot does not have.
     """
 
@@ -114,6 +117,9 @@ class ReferenceController:
                 f"a controller takes a robot, not {type(robot).__name__}: load_robot(name)"
             )
         check_drivable(robot)
+        self._base = base_of(robot)
+        if self._base:
+            singularity = _singularity_of_base(robot, bias, gravity, collisions, singularity)
         if stack.limits is not None:
             Profile(stack.limits.profile)
         self._robot, self._stack = robot, stack
@@ -133,14 +139,11 @@ class ReferenceController:
         self.calibration = self._scales.calibration(list(stack))
         if stack.limits is not None:
             stack.limits.bind(robot, self.calibration.brake)
-        if collisions is not None:
-            if not isinstance(collisions, CollisionAvoidance):
-                raise InputError(
-                    f"collisions takes a CollisionAvoidance, not {type(collisions).__name__}"
-                )
-            collisions.bind(robot)
+        stack.attach_contacts(self._touching)
+        _bind_collisions(collisions, robot)
         self._collisions = collisions
         self._handover: Handover | None = None
+        self._last_torque: np.ndarray | None = None
         self._loading: Loading | None = None
         self._plain = self._needs_no_more()
         self._observer = _observer(stack.limits, robot.nv, torque_limits)
@@ -156,6 +159,19 @@ class ReferenceController:
             0.0 if period is None else float(period),
             collisions,
         )
+
+    def _touching(self, contact: GroundContact) -> None:
+        """Get a contact ready.
+
+        Raises:
+            InputError: The robot stands on nothing.
+        """
+        if not self._base:
+            raise InputError(
+                f"contact {contact.name!r}: robot {self._robot.name!r} is bolted down; contacts are for "
+                "robots with a floating base"
+            )
+        contact.bind(self._robot)
 
     def _paced(self, period: float) -> Callable[[Task], None]:
         """Check the rates of everything that is there now, and of every task that is prepared later."""
@@ -371,13 +387,29 @@ class ReferenceController:
     def _answer(self, t: float, members: Sequence[Member], timing: Status) -> Command:
         """Compute the torque of these tasks for the robot's present state."""
         r = self.robot
-        given = Given(self._rules, t, members, r, r.q, r.v, r.M, r.bias, r.torque_limit)
+        touching = self.stack.begin_contacts(t) if self._base else ()
+        given = Given(
+            self._rules,
+            t,
+            members,
+            r,
+            r.q,
+            r.v,
+            r.M,
+            r.bias,
+            r.torque_limit,
+            base=self._base,
+            contacts=touching,
+        )
         answer = tick(given)
         if answer is None:
             return self._hold(t, timing | Status.FAULT)
-        tau, status, hard_solves, found = answer
+        tau, status, hard_solves, found, hindrance = answer
+        self.stack.hinder(hindrance)
         if Status.FAULT in status:
             tau = self._braking()
+        elif self._base:
+            self._last_torque = tau
         command = Command(t, tau, status | timing, hard_solves, found)
         return command if self._plain else self._finished(command, members)
 
@@ -393,11 +425,44 @@ class ReferenceController:
         return Command(t, tau, status, 0, Found({}, (), {}))
 
     def _braking(self) -> np.ndarray:
-        """Bias with joint damping, inside the motors' limits; finite whatever the model says."""
+        """Bias with joint damping, inside the motors' limits; finite whatever the model says.
+
+        On a floating base it is the last torque with joint damping: the bias alone carries nothing.
+        """
         robot = self.robot
-        tau = robot.bias - self.damping * robot.M.diagonal() * robot.v
+        held = robot.bias if self._last_torque is None else self._last_torque
+        tau = held - self.damping * robot.M.diagonal() * robot.v
         limit = np.minimum(robot.torque_limit, np.finfo(float).max)
+        limit[: self._base] = 0.0
         return np.clip(np.nan_to_num(tau, nan=0.0), -limit, limit)
+
+
+def _singularity_of_base(
+    robot: Robot,
+    bias: str,
+    gravity: str,
+    collisions: CollisionAvoidance | None,
+    singularity: Singularity | None,
+) -> Singularity | None:
+    """Refuse what does not go with a floating base, and tell what stands for the default buffer."""
+    if bias != "joint" or gravity != "controller":
+        raise InputError(
+            f"robot {robot.name!r} has a floating base: nothing holds its weight but contacts, "
+            "so it takes bias='joint' and gravity='controller'"
+        )
+    if collisions is not None:
+        raise InputError(
+            f"robot {robot.name!r} has a floating base, whose controller does not keep distances yet"
+        )
+    return None if singularity is DEFAULT_SINGULARITY else singularity
+
+
+def _bind_collisions(collisions: CollisionAvoidance | None, robot: Robot) -> None:
+    if collisions is None:
+        return
+    if not isinstance(collisions, CollisionAvoidance):
+        raise InputError(f"collisions takes a CollisionAvoidance, not {type(collisions).__name__}")
+    collisions.bind(robot)
 
 
 def _observer(limits: JointLimits | None, n: int, torque_limits: str) -> DisturbanceObserver | None:

@@ -9,9 +9,16 @@ from typing import NamedTuple
 import numpy as np
 
 from opspace.command import Found, Status
-from opspace.controller.bounds import Bounds, change_within_tick, realise
+from opspace.controller.bounds import Bounds, Kept, change_within_tick, realise
 from opspace.controller.collisions import DistanceTerms, distance_terms
+from opspace.controller.contact_stages import (
+    Footing,
+    contact_task_sets,
+    evaluate_contacts,
+    stand,
+)
 from opspace.controller.disturbance import DisturbanceObserver
+from opspace.controller.drivable import joint_positions
 from opspace.controller.limit_task_sets import (
     LimitTerms,
     braking,
@@ -36,7 +43,7 @@ from opspace.law.blending import combined
 from opspace.law.scalars import SCALED, room_for
 from opspace.plan.scales import Scales
 from opspace.robots.protocol import Robot
-from opspace.stack import Blending, Member, Mixture, mixture, presences
+from opspace.stack import Blending, ContactMember, Member, Mixture, mixture, presences
 from opspace.tasks import JointLimits, PostureTask, TaskTerms, TrackingTask
 from opspace.tasks.activations import own_activation
 from opspace.tasks.collision_avoidance import CollisionAvoidance
@@ -126,6 +133,8 @@ class Given:
         torque_limit: (n,) what the motors give, N·m.
         reaction: (n,) what tasks expect of the world, N·m; None for nothing.
         part: How much of it the motors can give.
+        base: Number of the first coordinates without a motor, those of a floating base.
+        contacts: What a robot with such a base touches.
     """
 
     rules: Rules
@@ -139,6 +148,8 @@ class Given:
     torque_limit: np.ndarray
     reaction: np.ndarray | None = None
     part: float = 1.0
+    base: int = 0
+    contacts: Sequence[ContactMember] = ()
 
 
 class Blend(NamedTuple):
@@ -148,22 +159,17 @@ class Blend(NamedTuple):
     corners: Sequence[Weighted]
 
 
-class Kept(NamedTuple):
-    """Torque (n,) within all bounds, N·m, what happened, and what each limit and distance takes."""
-
-    tau: np.ndarray
-    status: Status
-    acting: dict[str, float]
-    taken: np.ndarray
-
-
 class Answer(NamedTuple):
-    """Torque (n,), N·m, what happened, the number of hard torques and what there is to report."""
+    """Torque (n,), N·m, what happened, the number of hard torques and what there is to report.
+
+    ``hindrance`` is what the contacts could not carry, see `opspace.stack.ContactMember.advance`.
+    """
 
     tau: np.ndarray
     status: Status
     hard_solves: int
     found: Found
+    hindrance: float = 0.0
 
 
 def tick(k: Given) -> Answer | None:
@@ -182,19 +188,24 @@ def tick(k: Given) -> Answer | None:
     tasks = whiten_tasks(k, h, terms, mixed, L)
     limits = begin_limits(k)
     inserted = insert_limits(k)
+    touches = evaluate_contacts(k)
+    above = on_the_ground(k, touches, limit_corners(k, limits, inserted))
     try:
-        gamma, info = law(k, L, mixed, tasks, limit_corners(k, limits, inserted))
+        gamma, info = law(k, L, mixed, tasks, above)
         distances = measure_distances(k)
-        kept = keep_bounds(k, L, limits, distances, tasks, torque(k, gamma))
+        if k.base:
+            kept = stand(k, L, limits, touches, metric(L, tasks), gamma)
+        else:
+            kept = keep_bounds(k, L, limits, distances, tasks, torque(k, gamma))
     except (InputError, np.linalg.LinAlgError):
         # Everything that went in is finite: these numbers are too large to compute with.
         return None
-    tau, kept, acting, taken = kept
-    active = {limits[i].side.name: limit for i, limit in inserted.items()} | acting
-    levels = level_status(k.members, mixed, info, len(inserted))
-    apart = {} if distances is None else distances.layout.status(distances.distance, taken)
-    found = Found(task_status(k.members, h, terms, mixed), levels, active, apart)
-    return Answer(tau, status(k, tau, info, found) | kept, info.hard_solves, found)
+    active = {limits[i].side.name: limit for i, limit in inserted.items()} | dict(kept.limits)
+    levels = level_status(k.members, mixed, info, len(above.task_sets))
+    apart = {} if distances is None else distances.layout.status(distances.distance, kept.taken)
+    found = Found(task_status(k.members, h, terms, mixed), levels, active, apart, kept.contacts)
+    happened = status(k, kept.tau, info, found) | kept.status
+    return Answer(kept.tau, happened, info.hard_solves, found, kept.hindrance)
 
 
 def activations(k: Given) -> list[float]:
@@ -315,7 +326,9 @@ def law(
     first = len(limits.task_sets)
     shifted = [Weighted(w, frozenset(first + i for i in here)) for w, here in tasks.corners]
     everything = combined(limits.corners, shifted)
-    motors = Motors(L, start_inside(k), k.torque_limit) if rules.keep_torque else None
+    # On the ground the motors' limits act behind the law, together with those of the forces.
+    scales = rules.keep_torque and not k.base
+    motors = Motors(L, start_inside(k), k.torque_limit) if scales else None
     buffer, motion = rules.scales.buffer, L.T @ k.v
     return rules.law(Question(L, sets, everything, mixed.levels, buffer, motors, motion))
 
@@ -334,13 +347,14 @@ def begin_limits(k: Given) -> list[LimitTerms]:
     if observer is not None:
         observer.observe(k.t, k.v)
     most = braking(k.M, k.bias, k.torque_limit)
-    return limit_terms(limits, k.q, k.v, most, k.rules.period, observer and observer.acceleration)
+    at = joint_positions(k.robot)
+    return limit_terms(limits, at, k.v, most, k.rules.period, observer and observer.acceleration)
 
 
 def insert_limits(k: Given) -> dict[int, float]:
     """Activation of the limits that take part as task sets, by index (Fig. 7)."""
     limits = k.rules.limits
-    found = [] if limits is None else limits.presences(k.q, k.v)
+    found = [] if limits is None else limits.presences(joint_positions(k.robot), k.v)
     return {i: h for i, h in enumerate(found) if h > 0.0}
 
 
@@ -351,6 +365,17 @@ def limit_corners(k: Given, limits: Sequence[LimitTerms], inserted: Mapping[int,
     """
     sets = limit_task_sets(limits, inserted, k.v.size, k.rules.scales.joint)
     return Blend(sets, corners([task.activation for task in sets], "chain"))
+
+
+def on_the_ground(k: Given, touches: Sequence[Footing], limits: Blend) -> Blend:
+    """Put what contacts hold above the joint limits."""
+    sets = contact_task_sets(touches)
+    if not sets:
+        return limits
+    first = len(sets)
+    shifted = [Weighted(w, frozenset(first + i for i in here)) for w, here in limits.corners]
+    closing = corners([touch.motion for touch in touches if touch.motion > 0.0], "chain")
+    return Blend([*sets, *limits.task_sets], combined(closing, shifted))
 
 
 def torque(k: Given, gamma: np.ndarray) -> np.ndarray:
@@ -376,21 +401,20 @@ def keep_bounds(
 ) -> Kept:
     """Take the nearest torque with which no joint, motor or distance does more than it may."""
     rules, observer = k.rules, k.rules.observer
-    kept, acting, taken = Status.OK, {}, np.zeros(0)
+    kept = Kept(tau)
     keeps = limits if rules.limits is not None and rules.limits.law.bound else []
     if keeps or rules.keep_torque or distances is not None:
         room = k.torque_limit if rules.keep_torque else np.full(k.v.size, np.inf)
-        bounds, wanted = Bounds(keeps, k.M, k.bias, room, distances), tau
-        tau, kept, acting, taken = realise(bounds, wanted, lambda: metric(L, tasks))
-        acceleration = np.linalg.solve(k.M, tau - k.bias)
+        bounds = Bounds(keeps, k.M, k.bias, room, distances)
+        kept = realise(bounds, tau, lambda: metric(L, tasks))
+        acceleration = np.linalg.solve(k.M, kept.tau - k.bias)
         if rules.period > 0.0 and k.q.size == k.v.size and bounds.near(acceleration):
-            own = tau if k.reaction is None else tau - k.reaction
+            own = kept.tau if k.reaction is None else kept.tau - k.reaction
             change = change_within_tick(k.robot, own, acceleration, rules.period)
-            later = bounds.after(change)
-            tau, kept, acting, taken = realise(later, wanted, lambda: metric(L, tasks))
+            kept = realise(bounds.after(change), tau, lambda: metric(L, tasks))
     if observer is not None:
-        observer.remember(k.t, k.v, np.linalg.solve(k.M, tau - k.bias))
-    return Kept(tau, kept, acting, taken)
+        observer.remember(k.t, k.v, np.linalg.solve(k.M, kept.tau - k.bias))
+    return kept
 
 
 def metric(L: np.ndarray, tasks: Blend) -> np.ndarray:

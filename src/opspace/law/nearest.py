@@ -127,6 +127,35 @@ def _hold(
     return False
 
 
+def nearest_within(
+    x: Float[np.ndarray, " n"],
+    rows: Float[np.ndarray, "k n"],
+    bounds: Float[np.ndarray, " k"],
+    softness: Float[np.ndarray, " k"],
+) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, " k"]]:
+    """Find the point nearest to x with rows · y <= bounds, whatever the length of the rows.
+
+    What softness leaves of the excess where much is asked for is projected away again.
+
+    Args:
+        x: (n,).
+        rows: (k, n); a row that is zero bounds nothing.
+        bounds: (k,), those from `UNBOUNDED` on are none.
+        softness: (k,) above 0, of rows of unit length.
+
+    Returns:
+        The point, (n,), and by how much each bound moved it along its row, (k,).
+    """
+    size = np.linalg.norm(rows, axis=1)
+    there = (bounds < UNBOUNDED) & (size > 0.0)
+    taken = np.zeros(bounds.size)
+    unit = rows[there] / size[there, None]
+    for _ in range(CLEANINGS):
+        x, multipliers = nearest_point(x, unit, bounds[there] / size[there], softness[there])
+        taken[there] += multipliers * size[there]
+    return x, taken
+
+
 def nearest_acceleration(
     L: Float[np.ndarray, "n n"],
     W: Float[np.ndarray, "n n"],
@@ -172,16 +201,10 @@ def nearest_acceleration(
         rows = np.concatenate([rows, np.linalg.solve(C, combined.T).T])
         bounds = np.concatenate([bounds, most])
         softness = np.concatenate([softness, np.full(most.size, SOFT)])
-    size = np.linalg.norm(rows, axis=1)
-    there = (bounds < UNBOUNDED) & (size > 0.0)
     taken = np.zeros(bounds.size)
-    if not np.any(there):
+    if not np.any((bounds < UNBOUNDED) & (np.linalg.norm(rows, axis=1) > 0.0)):
         return Nearest(acceleration, taken[:n], taken[:n], motors=False, rows=taken[4 * n :])
-    unit = rows[there] / size[there, None]
-    z = C.T @ acceleration
-    for _ in range(CLEANINGS):
-        z, multipliers = nearest_point(z, unit, bounds[there] / size[there], softness[there])
-        taken[there] += multipliers * size[there]
+    z, taken = nearest_within(C.T @ acceleration, rows, bounds, softness)
     motors_act = bool(np.any(taken[2 * n : 4 * n]))
     return Nearest(np.linalg.solve(C.T, z), taken[:n], taken[n : 2 * n], motors_act, taken[4 * n :])
 

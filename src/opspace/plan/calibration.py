@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from opspace.errors import ModelError
-from opspace.robots.protocol import Robot
+from opspace.robots.protocol import BASE, Robot
 from opspace.tasks import Task
 from opspace.tasks.motion_task import MotionTask
 
@@ -131,7 +131,7 @@ def sample_postures(robot: Robot) -> Iterator[np.ndarray]:
     goes no model tells. What carries mass further out than that has less σ than any posture here.
 
     Args:
-        robot: A robot whose joints have one coordinate each.
+        robot: A robot whose joints have one coordinate each, its base fixed or floating.
 
     Yields:
         Configurations (nq,).
@@ -139,8 +139,11 @@ def sample_postures(robot: Robot) -> Iterator[np.ndarray]:
     rng = np.random.default_rng(0)
     lower = np.where(np.isfinite(robot.q_lower), robot.q_lower, -np.pi)
     upper = np.where(np.isfinite(robot.q_upper), robot.q_upper, np.pi)
+    base = BASE if robot.floating_base else 0
     for _ in range(SAMPLES):
-        yield rng.uniform(lower, upper)
+        joints = rng.uniform(lower, upper)
+        # Where a floating base is makes no difference to any scale.
+        yield np.concatenate([robot.q_reference[: base + 1], joints[base:]]) if base else joints
 
 
 def _smallest_per_unit(task: Task, inverse_inertia: np.ndarray) -> np.ndarray:

@@ -8,7 +8,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from opspace.command import Distance, Found, LevelStatus, TaskStatus
+from opspace.command import (
+    NO_CONTACTS,
+    ContactStatus,
+    Distance,
+    Found,
+    LevelStatus,
+    TaskStatus,
+)
 from opspace.kernels.columns import slot_bit
 from opspace.plan.entries import KERNELS
 from opspace.plan.memory import Reported
@@ -66,6 +73,11 @@ class CompiledReport:
             return {}
         found = self._found().numbers("limit_h")
         return {side.name: h for side, h in zip(limits.sides, found, strict=True) if h > 0.0}
+
+    @property
+    def contacts(self) -> Mapping[str, ContactStatus]:
+        """Nothing: what has contacts takes the readable tick."""
+        return NO_CONTACTS
 
     @property
     def distances(self) -> Mapping[str, Distance]:

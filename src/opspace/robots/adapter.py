@@ -571,6 +571,11 @@ def held_joints(robot: Robot) -> Mapping[str, float | None]:
     return dict.fromkeys(robot.locked_joints, 0.0)
 
 
+def added_armature(robot: Robot) -> float:
+    """Tell the inertia of motors that a URDF was read with, kg·m² or kg."""
+    return robot.description.armature if isinstance(robot, AdapterBase) else 0.0
+
+
 def spread_of(robot: Robot) -> Spread | None:
     """Tell how the joints of the file follow those of the robot; None where none follows."""
     return robot.spread if isinstance(robot, AdapterBase) else None

@@ -23,6 +23,7 @@ class CatalogueEntry:
         posture: Joint angles in rad of the reference posture; joints not named are at zero.
         height: Height in m of a floating base in the reference posture, feet on the floor.
         locked_joints: Joints held at zero, such as those of a gripper.
+        armature: Inertia of the motors at the joints, which URDF has no word for, kg·m².
         kind: "arm", "humanoid" or "quadruped".
         package: Package that the file comes from.
     """
@@ -34,6 +35,7 @@ class CatalogueEntry:
     posture: Mapping[str, float] = field(default_factory=dict)
     height: float = 0.0
     locked_joints: tuple[str, ...] = ()
+    armature: float = 0.0
     kind: str = "arm"
     package: str = PACKAGE
 
@@ -157,6 +159,7 @@ CATALOGUE: dict[str, CatalogueEntry] = {
         | _both_sides("leg_{side}_{joint}", _TALOS_LEG, ()),
         1.01927,
         locked_joints=("gripper_left_joint", "gripper_right_joint"),
+        armature=0.01,
         kind="humanoid",
     ),
     "g1": CatalogueEntry(
@@ -166,6 +169,7 @@ CATALOGUE: dict[str, CatalogueEntry] = {
         "right_rubber_hand",
         _both_sides("{side}_{joint}_joint", _G1_SIDE, ("shoulder_roll",)),
         0.763,
+        armature=0.01,
         kind="humanoid",
     ),
     "go2": CatalogueEntry(

@@ -71,6 +71,7 @@ class Description:
         joint_units: (nv,) unit of each coordinate's position, "rad" or "m".
         springs: What pulls at the joints besides, None for nothing.
         couplings: Joints of the file that follow one of these.
+        armature: Inertia of the motor at every joint that a URDF was read with, kg·m² or kg.
         locked: Where joints of the file are held, rad or m; None for those with several
             coordinates, which are held where the file has them.
         warnings: What the file says and the controller does not follow, a sentence each.
@@ -93,6 +94,7 @@ class Description:
     quaternions: tuple[int, ...] = ()
     floating_base: bool = False
     couplings: tuple[Coupling, ...] = ()
+    armature: float = 0.0
     locked: Mapping[str, float | None] = field(default_factory=dict)
     configurations: Mapping[str, np.ndarray] = field(default_factory=dict)
     springs: Springs | None = None

@@ -32,10 +32,12 @@ class JointChoice:
         joints: Names or patterns ("left_*") of those to control; None for all that have a motor.
         locked: Names or patterns of those to hold, and where, rad or m; names alone are held where
             the file has them.
+        armature: Inertia of the motor at every joint of a URDF, kg·m² or kg, which has no word for it.
     """
 
     joints: tuple[str, ...] | None = None
     locked: Mapping[str, float | None] = field(default_factory=dict)
+    armature: float = 0.0
 
     @classmethod
     def of(

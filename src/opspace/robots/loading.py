@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -57,6 +57,8 @@ def read_robot(
         raise ModelError(f"{path}: no such file")
     if path.suffix not in SUFFIXES:
         raise ModelError(f"{path}: a robot file ends in {' or '.join(SUFFIXES)}")
+    if choice.armature and path.suffix != ".urdf":
+        raise ModelError(f"{path}: an MJCF file says itself what armature its joints have")
     read = _read_urdf if path.suffix == ".urdf" else _read_mjcf
     try:
         robot = read(path, backend, floating_base, choice)
@@ -71,8 +73,9 @@ def read_robot(
 
 
 def _read_urdf(path: Path, backend: str, floating_base: bool, choice: JointChoice) -> RobotFile:
-    urdf = read_urdf(path, choice.locked, floating_base, choice.joints)
-    return robot_of_urdf(urdf, describe_urdf(urdf, floating_base), backend, floating_base)
+    urdf = read_urdf(path, choice.locked, floating_base, choice.joints, choice.armature)
+    description = replace(describe_urdf(urdf, floating_base), armature=choice.armature)
+    return robot_of_urdf(urdf, description, backend, floating_base)
 
 
 def robot_of_urdf(

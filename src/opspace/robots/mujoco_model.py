@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -13,7 +13,7 @@ import mujoco
 import numpy as np
 
 from opspace.errors import ModelError
-from opspace.robots.adapter import held_joints
+from opspace.robots.adapter import added_armature, held_joints
 from opspace.robots.description import BASE_JOINT, WORLD, Description, ModelOrigin, mid_range
 from opspace.robots.joint_roles import (
     ALL_WITH_A_MOTOR,
@@ -71,6 +71,8 @@ def mujoco_model(
     source: Path | str,
     floating_base: bool = False,
     locked_joints: Collection[str] | Mapping[str, float | None] = (),
+    extend: Callable[[mujoco.MjSpec], None] | None = None,
+    armature: float = 0.0,
 ) -> mujoco.MjModel:
     """Compile a robot file into a plant that can be simulated and rendered.
 
@@ -85,6 +87,8 @@ def mujoco_model(
         floating_base: Whether the root link moves freely.
         locked_joints: Joints to hold fixed, and where, rad or m; names alone are held where the
             file has them.
+        extend: Adds what else there is to the specification, such as shapes that touch.
+        armature: Inertia of the motor at every joint of a URDF, kg·m² or kg.
 
     Returns:
         The compiled model.
@@ -95,7 +99,7 @@ def mujoco_model(
     path = Path(source)
     origin = ModelOrigin.of(path)
     if path.suffix == ".urdf":
-        urdf = read_urdf(path, locked_joints, floating_base)
+        urdf = read_urdf(path, locked_joints, floating_base, armature=armature)
         spec = urdf_spec(urdf, floating_base)
         add_skeleton(spec)
         couple(spec, urdf.roles.couplings, {})
@@ -105,13 +109,15 @@ def mujoco_model(
         if read.roles.couplings:
             couple(spec, read.roles.couplings, _zero(compile_spec(spec, origin)))
     add_scenery(spec)
+    if extend is not None:
+        extend(spec)
     model = compile_spec(spec, origin)
     # Where actuators carry weight, MuJoCo counts it to them; the plant drives joints without any.
     model.jnt_actgravcomp[:] = 0
     return model
 
 
-def model_of(robot: Robot) -> mujoco.MjModel:
+def model_of(robot: Robot, extend: Callable[[mujoco.MjSpec], None] | None = None) -> mujoco.MjModel:
     """Compile the file of a robot with the same joints held and coupled; see `mujoco_model`.
 
     Raises:
@@ -119,7 +125,9 @@ def model_of(robot: Robot) -> mujoco.MjModel:
     """
     if robot.source is None:
         raise ModelError(f"robot {robot.name!r} has no file that MuJoCo could load")
-    return mujoco_model(robot.source, robot.floating_base, held_joints(robot))
+    return mujoco_model(
+        robot.source, robot.floating_base, held_joints(robot), extend, added_armature(robot)
+    )
 
 
 def _zero(model: mujoco.MjModel) -> dict[str, float]:

@@ -45,10 +45,8 @@ def model_from_urdf(urdf: Urdf, floating_base: bool) -> Any:
     except (ValueError, RuntimeError) as error:
         reason = " ".join(str(error).split())
         raise ModelError(f"{urdf.origin}: Pinocchio cannot use it: {reason}") from None
-    for own in urdf.moving_joints:
-        fixed.armature[fixed.joints[fixed.getJointId(f"joint {own.name}")].idx_v] = own.armature
     if not floating_base:
-        return fixed
+        return _with_armature(fixed, urdf)
     base = pin.Model()
     joint = _add_free_joint(base, BASE_JOINT)
     frame = base.addFrame(
@@ -59,6 +57,13 @@ def model_from_urdf(urdf: Urdf, floating_base: bool) -> Any:
     for j in range(1, fixed.njoints):
         model.inertias[model.getJointId(fixed.names[j])] = fixed.inertias[j]
     model.inertias[joint] = inertia_on_world(fixed)
+    return _with_armature(model, urdf)
+
+
+def _with_armature(model: Any, urdf: Urdf) -> Any:
+    """Give every joint the inertia of its motor; joining two models would lose it."""
+    for own in urdf.moving_joints:
+        model.armature[model.joints[model.getJointId(f"joint {own.name}")].idx_v] = own.armature
     return model
 
 

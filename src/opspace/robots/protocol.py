@@ -8,6 +8,9 @@ from typing import Protocol, runtime_checkable
 
 import numpy as np
 
+BASE = 6
+"""Coordinates of a floating base in v."""
+
 
 @runtime_checkable
 class Robot(Protocol):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -75,6 +76,7 @@ def load_robot(
     locked: Collection[str] | Mapping[str, float] = (),
     tool: str | None = None,
     reference: ArrayLike | Mapping[str, float] | None = None,
+    armature: float | None = None,
 ) -> AdapterBase:
     """Load a robot by name, from a URDF or MJCF file, or from a model in memory.
 
@@ -97,6 +99,9 @@ def load_robot(
             hands and of joints that are held.
         reference: Reference posture: one number per coordinate, or positions by joint in rad or m;
             joints that are not named stay where the file has them.
+        armature: Inertia of the motor at every joint, rotor times gear ratio squared, kg·m² (kg of a
+            slide), for which URDF has no word; None is 0.01 for humanoids by name, else 0. Without it
+            a light joint, such as an ankle, has next to no inertia. MJCF files bring their own.
 
     Returns:
         The robot, updated at its reference posture at rest. What its file says and the controller
@@ -111,7 +116,13 @@ def load_robot(
     if backend not in BACKENDS:
         raise unknown_name("backend", backend, BACKENDS)
     choice = JointChoice.of(joints, locked)
+    if armature is not None:
+        if not (math.isfinite(armature) and armature >= 0.0):
+            raise ModelError(f"armature must be finite and at least 0, got {armature}")
+        choice = replace(choice, armature=float(armature))
     if is_model(source):
+        if choice.armature:
+            raise ModelError("a model in memory says itself what armature its joints have")
         file = read_model(source, backend, floating_base, choice)
         return _built(file, _chosen(file.description, tool, reference))
     if not isinstance(source, str | Path):
@@ -129,6 +140,8 @@ def load_robot(
     free = floating_base or entry.floating_base
     if joints is None:
         choice = replace(choice, locked={**dict.fromkeys(entry.locked_joints), **choice.locked})
+    if armature is None:
+        choice = replace(choice, armature=entry.armature)
     file = read_robot(path, backend, free, choice)
     named = _named(file.description, source, entry)
     return _built(file, _chosen(named, tool, reference))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import xml.etree.ElementTree as ET
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -93,6 +93,7 @@ def read_urdf(
     locked: Collection[str] | Mapping[str, float | None] = (),
     floating_base: bool = False,
     joints: Collection[str] | None = None,
+    armature: float = 0.0,
 ) -> Urdf:
     """Read a URDF file; shapes and transmissions are left out.
 
@@ -101,6 +102,7 @@ def read_urdf(
         locked: Joints to hold fixed, and where, rad or m; at zero where only names are given.
         floating_base: Whether the root link is to move freely.
         joints: Joints to control; None for all.
+        armature: Inertia of the motor at every joint, kg·m² or kg.
 
     Returns:
         The robot's tree.
@@ -109,7 +111,7 @@ def read_urdf(
         ModelError: The file does not exist, is no URDF, is not one tree, or its root cannot float.
         UnknownNameError: A joint that is asked for or followed is not in the file.
     """
-    choice = JointChoice.of(joints, locked)
+    choice = replace(JointChoice.of(joints, locked), armature=armature)
     return reduce_urdf(_parse(path), ModelOrigin.of(path), choice, floating_base)
 
 
@@ -141,7 +143,10 @@ def reduce_urdf(
     for repeated in (n for n in names if names.count(n) > 1):
         raise ModelError(f"{origin}: joint {repeated!r} occurs twice")
     roles = assign_roles(_file_joints(elements, origin), choice, origin.name)
-    built = {_name(e, origin): _joint(e, roles.locked, links, origin) for e in elements}
+    built = {
+        _name(e, origin): replace(_joint(e, roles.locked, links, origin), armature=choice.armature)
+        for e in elements
+    }
     base, ordered = _depth_first(built, links, origin)
     if floating_base and base == WORLD:
         raise ModelError(f"{origin}: the root link {WORLD!r} cannot float")

@@ -11,6 +11,7 @@ import numpy as np
 from opspace.errors import InputError, ModelError, missing_extra
 from opspace.robots.adapter import spread_of
 from opspace.sim.disturbances import NO_DISTURBANCES, Disturbances, Hand, Wire
+from opspace.sim.ground import Ground
 from opspace.sim.surfaces import Surface, TouchedWorld
 
 if TYPE_CHECKING:
@@ -42,6 +43,7 @@ class Plant:
         adds_gravity: Add the torque that holds the weight to every command, as robots do whose
             drivers are told the rest only; see ``gravity`` of `opspace.Controller`.
         disturbances: What the controller's model does not know.
+        ground: What a robot with a floating base stands on; None is nothing.
         surfaces: What the tool may touch; the wrench there is measured.
         substeps: Steps of the simulation in each time step; None is 1, or with surfaces as many
             as make them at most 0.25 ms.
@@ -63,6 +65,7 @@ class Plant:
         torque_limits: bool = True,
         adds_gravity: bool = False,
         disturbances: Disturbances = NO_DISTURBANCES,
+        ground: Ground | None = None,
         surfaces: Sequence[Surface] = (),
         substeps: int | None = None,
     ) -> None:
@@ -75,14 +78,16 @@ class Plant:
         if robot.source is None:
             raise ModelError(f"robot {robot.name!r} has no file that a simulator could load")
         self._mujoco = mujoco
-        self.model = model_of(robot)
+        self.model = model_of(robot, None if ground is None else ground.add_to)
         self.model.opt.timestep = dt / self._substeps
+        self._ground = ground
         # Implicit in the velocity: stable for stiff friction, exact for a frictionless arm to O(dt).
         self.model.opt.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
         # Joint ranges are the controller's job, and a stop or a contact would hide its failures.
+        if ground is None:
+            self.model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT
         self.model.opt.disableflags |= (
-            mujoco.mjtDisableBit.mjDSBL_CONTACT
-            | mujoco.mjtDisableBit.mjDSBL_LIMIT
+            mujoco.mjtDisableBit.mjDSBL_LIMIT
             | mujoco.mjtDisableBit.mjDSBL_ACTUATION
             # A run that diverges must be seen to diverge, not start again from the beginning.
             | mujoco.mjtDisableBit.mjDSBL_AUTORESET
@@ -91,12 +96,13 @@ class Plant:
             self.model.dof_damping[:] = 0.0
             self.model.dof_frictionloss[:] = 0.0
         spread = self._spread = spread_of(robot)
-        limit = robot.torque_limit
+        # A floating base has no motor that a command could reach.
+        limit = motors = np.where(robot.actuated, robot.torque_limit, 0.0)
         if spread is not None:
             limit = np.zeros(self.model.nv)
-            limit[spread.leaders] = robot.torque_limit
+            limit[spread.leaders] = motors
         disturbances.spoil(self.model, limit)
-        self._limit = robot.torque_limit if torque_limits else np.full(robot.nv, np.inf)
+        self._limit = motors if torque_limits else np.where(robot.actuated, np.inf, 0.0)
         self._robot = robot
         self.adds_gravity = adds_gravity
         self._own_model = robot.fresh() if adds_gravity else None
@@ -205,6 +211,11 @@ class Plant:
         else:
             self.data.qfrc_applied[self._spread.leaders] = given
         self._mujoco.mj_step(self.model, self.data)
+
+    @property
+    def contact_forces(self) -> dict[str, np.ndarray]:
+        """What presses on each contact of the ground, (3,) N on the robot in world axes, by name."""
+        return {} if self._ground is None else self._ground.forces(self.model, self.data)
 
     def _own(self, values: np.ndarray) -> np.ndarray:
         """Leave the joints that lead; those that follow belong to the simulation."""

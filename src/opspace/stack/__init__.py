@@ -1,5 +1,6 @@
 """The tasks of a controller: who is in, at which level, and how that changes in time."""
 
+from opspace.stack.contact_course import ContactMember as ContactMember
 from opspace.stack.groups import Blending as Blending
 from opspace.stack.members import Member as Member
 from opspace.stack.members import Variable as Variable

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import overload
 
+from opspace.contacts import GroundContact
 from opspace.errors import InputError, unknown_name
 from opspace.stack.changes import (
     Insert,
@@ -14,6 +16,7 @@ from opspace.stack.changes import (
     checked_level,
     checked_task,
 )
+from opspace.stack.contact_course import ContactCourse, ContactMember
 from opspace.stack.members import Member
 from opspace.stack.rehearsal import Outlook
 from opspace.stack.transitions import Transitions
@@ -43,6 +46,8 @@ class Stack:
         levels: Tasks, lists of tasks, and at most one `JointLimits`; or a mapping from the number
             of each level to its task or tasks.
         limits: The joint limits, where they do not stand in the list.
+        contacts: What a robot with a floating base touches from the start. Contacts have no level:
+            they are physics, above everything else.
 
     Raises:
         InputError: An entry that is no task, a name used twice, or more than one `JointLimits`.
@@ -53,6 +58,7 @@ class Stack:
         levels: Sequence[Task | JointLimits | Sequence[Task]]
         | Mapping[float, Task | Sequence[Task]],
         limits: JointLimits | None = None,
+        contacts: Sequence[GroundContact] = (),
     ) -> None:
         if isinstance(levels, Task | JointLimits):
             raise InputError(f"a stack takes a list of tasks: Stack([{levels!r}])")
@@ -70,6 +76,9 @@ class Stack:
         ):
             for task in (entry,) if isinstance(entry, Task) else _as_level(entry):
                 self._transitions.start_with(task, number)
+        self._contacts = ContactCourse()
+        for contact in contacts:
+            self._contacts.start_with(self._new_contact(contact))
 
     def __iter__(self) -> Iterator[Task]:
         """Iterate over the tasks, most important first."""
@@ -102,6 +111,14 @@ class Stack:
         for number in sorted({member.level for member in self.members}):
             there = (self._told(member) for member in self.members if member.level == number)
             lines.append(f"  level {number:g}: {', '.join(there)}")
+        touching = [
+            one.contact.name
+            if one.progress == 1.0
+            else f"{one.contact.name} ({one.progress:.2g} present)"
+            for one in self._contacts.present
+        ]
+        if touching:
+            lines.insert(1, f"  contacts: {', '.join(touching)}")
         return "\n".join(lines)
 
     def _told(self, member: Member) -> str:
@@ -130,7 +147,7 @@ class Stack:
     @property
     def settled(self) -> bool:
         """Whether no transition was on its way or due at the last tick; later ones may wait."""
-        return self._transitions.settled()
+        return self._transitions.settled() and self._contacts.settled()
 
     @property
     def waiting(self) -> bool:
@@ -147,6 +164,12 @@ class Stack:
         """The tasks of the last tick with their places, or those there are at the start."""
         return self._transitions.present()
 
+    @property
+    def contacts(self) -> Mapping[str, GroundContact]:
+        """The contacts by name; those that are leaving or wait for their time are among them."""
+        return {contact.name: contact for contact in self._contacts}
+
+    @overload
     def insert(
         self,
         task: Task,
@@ -155,14 +178,48 @@ class Stack:
         *,
         profile: str = "quintic",
         start_time: float | None = None,
+    ) -> None: ...
+
+    @overload
+    def insert(
+        self,
+        task: GroundContact,
+        duration: float = 0.5,
+        /,
+        *,
+        profile: str = "quintic",
+        start_time: float | None = None,
+    ) -> None: ...
+
+    @overload
+    def insert(
+        self,
+        task: GroundContact,
+        *,
+        duration: float,
+        profile: str = "quintic",
+        start_time: float | None = None,
+    ) -> None: ...
+
+    def insert(
+        self,
+        task: Task | GroundContact,
+        level: float | None = None,
+        duration: float | None = None,
+        *,
+        profile: str = "quintic",
+        start_time: float | None = None,
     ) -> None:
-        """Insert a task; one that is leaving comes back, one that is coming is retimed.
+        """Insert a task or a contact; one that is leaving comes back, one that is coming is retimed.
 
         Preparing a task that the controller has not seen takes some 20 ms, here and not in the
         tick; `prepare` does it beforehand.
 
+        A contact has no level: ``insert(contact, duration)``. Its motion comes first, in 0.3 of the
+        duration, then its force; the robot must touch when it is inserted.
+
         Args:
-            task: The task. Without a target it holds what it finds when it starts.
+            task: The task. Without a target it holds what it finds when it starts. Or a contact.
             level: Number of its level; lower is more important.
             duration: How long it takes, s; 0 is a hard switch.
             profile: Name of the activation profile.
@@ -173,30 +230,70 @@ class Stack:
                 a number that cannot be used.
             UnknownNameError: A frame or joint that the robot does not have, or an unknown profile.
         """
-        timing = Timing(duration, profile, start_time)
-        self._transitions.ask(Insert(timing, checked_task(task), checked_level(level)))
+        if isinstance(task, GroundContact):
+            if level is not None and duration is not None:
+                raise InputError(f"a contact has no level: insert({task.name!r}, duration)")
+            found = next((one for one in (duration, level) if one is not None), 0.5)
+            timing = Timing(found, profile, start_time)
+            self._contacts.insert(self._new_contact(task), timing)
+            return
+        if level is None:
+            raise InputError("a task needs a level: insert(task, level)")
+        timing = Timing(0.5 if duration is None else duration, profile, start_time)
+        if checked_task(task).name in self.contacts:
+            raise InputError(
+                f"{task.name!r} is the name of a contact; give the task another (name=...)"
+            )
+        self._transitions.ask(Insert(timing, task, checked_level(level)))
+
+    def _new_contact(self, contact: object) -> GroundContact:
+        """Check that something is a contact with a name that no task has.
+
+        Raises:
+            InputError: It is not.
+        """
+        if not isinstance(contact, GroundContact):
+            raise InputError(
+                f"contacts are SoleContact or PointContact, not {type(contact).__name__}"
+            )
+        known = self.contacts.get(contact.name, contact)
+        if known is not contact or contact.name in [task.name for task in self]:
+            raise InputError(
+                f"{contact.name!r} is the name of another member; give the contact another (name=...)"
+            )
+        return contact
 
     def remove(
         self,
-        task: Task | str,
+        task: Task | GroundContact | str,
         duration: float = 0.5,
         *,
         profile: str = "quintic",
         start_time: float | None = None,
+        wait: bool | None = None,
     ) -> None:
-        """Remove a task; one that is coming turns around, one that is leaving is retimed.
+        """Remove a task or a contact; one that is coming turns around, one that is leaving is retimed.
 
         Args:
-            task: The task or its name.
+            task: The task or the contact, or its name.
             duration: How long it takes, s; 0 is a hard switch.
             profile: Name of the activation profile.
             start_time: When it starts, in the time of the controller, s; None is the next tick.
+            wait: Of a contact: let it go no faster than the others can carry (True, which None is
+                as well), or whatever falls. A hard switch waits for nothing.
 
         Raises:
-            InputError: A number that cannot be used.
+            InputError: A number that cannot be used, or ``wait`` for a task.
             UnknownNameError: No such task in the stack, or an unknown profile.
         """
-        self._transitions.ask(Remove(Timing(duration, profile, start_time), task))
+        timing = Timing(duration, profile, start_time)
+        name = task if isinstance(task, str) else getattr(task, "name", None)
+        if isinstance(task, GroundContact) or (name in self.contacts and isinstance(task, str)):
+            self._contacts.remove(task, timing, wait=wait is not False)
+            return
+        if wait is not None:
+            raise InputError(f"only contacts wait, and {name!r} is not one")
+        self._transitions.ask(Remove(timing, task))
 
     def move(
         self,
@@ -250,6 +347,7 @@ class Stack:
     def cancel_scheduled(self) -> None:
         """Forget every request that has not started."""
         self._transitions.cancel()
+        self._contacts.cancel()
 
     def prepare(self, task: Task) -> None:
         """Do beforehand what `insert` would do with a new task: look up names and calibrate.
@@ -283,6 +381,23 @@ class Stack:
     def resume(self) -> None:
         """Let the next tick go on as if there had been no pause; see `opspace.Controller.restart`."""
         self._transitions.resume()
+        self._contacts.resume()
+
+    def attach_contacts(self, bind: Callable[[GroundContact], None]) -> None:
+        """Let a controller bind every contact that is in the stack or will be.
+
+        Args:
+            bind: Looks up the contact's frame, or refuses it.
+        """
+        self._contacts.attach(bind)
+
+    def begin_contacts(self, t: float) -> tuple[ContactMember, ...]:
+        """Move contacts on to time ``t`` [s] and return those there are, as `begin_tick` does."""
+        return self._contacts.begin_tick(t)
+
+    def hinder(self, hindrance: float) -> None:
+        """Tell the contacts that are to go what the last tick gave up, see `ContactMember.advance`."""
+        self._contacts.hinder(hindrance)
 
     def begin_tick(self, t: float) -> tuple[Member, ...]:
         """Start what is due at time ``t`` [s], drop what has left, and return the tasks there are.

@@ -6,6 +6,7 @@ from opspace.tasks.activations import ActivationProduct as ActivationProduct
 from opspace.tasks.activations import ActivationUnion as ActivationUnion
 from opspace.tasks.activations import DistanceBuffer as DistanceBuffer
 from opspace.tasks.activations import JointBuffer as JointBuffer
+from opspace.tasks.angular_momentum import AngularMomentumTask as AngularMomentumTask
 from opspace.tasks.collision_avoidance import CollisionAvoidance as CollisionAvoidance
 from opspace.tasks.com import ComTask as ComTask
 from opspace.tasks.contact import Contact as Contact

@@ -41,12 +41,14 @@ class JointBuffer:
         self.joint = joint
         self.buffer = Buffer(off, on, profile)
         self._endless: bool | None = None
+        self._entry = 0
 
     def bind(self, robot: Robot) -> None:
         """Check that the robot has the joint, and see whether it turns without end."""
         if self.joint not in robot.joint_names:
             raise unknown_name("joint", self.joint, robot.joint_names)
-        self._endless = bool(joint_layout(robot, [self.joint]).endless[0])
+        layout = joint_layout(robot, [self.joint])
+        self._endless, self._entry = bool(layout.endless[0]), int(layout.entries[0])
         if self._endless and abs(self.buffer.on - self.buffer.off) >= math.pi:
             raise InputError(
                 f"joint {self.joint!r} turns without end: off={self.buffer.off:g} and "
@@ -57,7 +59,7 @@ class JointBuffer:
         """Evaluate the activation at the robot's present state."""
         if self._endless is None:
             self.bind(robot)
-        position = float(robot.q[robot.joint_names.index(self.joint)])
+        position = float(robot.q[self._entry])
         return self.buffer(self._folded(position) if self._endless else position).value
 
     def _folded(self, position: float) -> float:
@@ -175,15 +177,35 @@ def own_activation(task: Task, robot: Robot, t: float) -> float:
     Raises:
         InputError: It is not in [0, 1].
     """
-    if task.activation is None:
+    return checked_activation(f"task {task.name!r}", task.activation, robot, t)
+
+
+def checked_activation(
+    who: str, activation: Callable[[Robot, float], float] | None, robot: Robot, t: float
+) -> float:
+    """Evaluate an activation of the user's, 1 where there is none.
+
+    Args:
+        who: Whose it is, for the error.
+        activation: The function.
+        robot: The robot at the present state.
+        t: Time, s.
+
+    Returns:
+        h, 0 to 1.
+
+    Raises:
+        InputError: It is not in [0, 1].
+    """
+    if activation is None:
         return 1.0
-    given = task.activation(robot, t)
+    given = activation(robot, t)
     try:
         h = float(given)
     except (TypeError, ValueError, OverflowError):
         h = math.nan
     if not 0.0 <= h <= 1.0:
         raise InputError(
-            f"task {task.name!r}: activation at t = {t:.6g} s must be in [0, 1], got {shown(given)}"
+            f"{who}: activation at t = {t:.6g} s must be in [0, 1], got {shown(given)}"
         )
     return h
