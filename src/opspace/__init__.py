@@ -131,12 +131,11 @@ _NAMES = {
     "opspace.stack": "Stack",
     "opspace.tasks": (
         "ActivationProduct ActivationUnion AngularMomentumTask Ball Box Capsule Chain Circle "
-        "CollisionAvoidance "
-        "ComTask Constant Contact DistanceBuffer ForceTask GiveWay HalfSpace ImpedanceTask "
-        "JerkLimited JointBuffer JointLimits JointTask MinimumJerk OrientationJerkLimited "
-        "OrientationMinimumJerk OrientationTask PoseReference PoseTask PositionTask PostureTask "
-        "Reference RelativeOrientationTask RelativePoseTask RelativePositionTask Sample Task "
-        "TaskTerms Touch TrackingTask ViaPoints"
+        "CollisionAvoidance ComTask Constant Contact DistanceBuffer ForceTask GiveWay HalfSpace "
+        "ImpedanceTask JerkLimited JointBuffer JointLimits JointTask MinimumJerk "
+        "OrientationJerkLimited OrientationMinimumJerk OrientationTask PoseReference PoseTask "
+        "PositionTask PostureTask Reference RelativeOrientationTask RelativePoseTask "
+        "RelativePositionTask Sample Task TaskTerms Touch TrackingTask ViaPoints"
     ),
     "opspace.view": "RunRequest Viewer",
 }

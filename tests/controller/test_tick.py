@@ -255,7 +255,7 @@ def test_bad_options_are_refused(robot):
         Controller(robot, stack, bias="joints")
     with pytest.raises(InputError, match="damping"):
         Controller(robot, stack, damping=-1.0)
-    with pytest.raises(InputError, match="0 < lower < upper"):
+    with pytest.raises(InputError, match="0 < lower < release <= upper"):
         Singularity(0.5, 0.1)
     with pytest.raises(UnknownNameError, match=r"scale 'relativ'.*relative"):
         Singularity(scale="relativ")

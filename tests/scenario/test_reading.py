@@ -102,6 +102,10 @@ def test_keys_and_defaults_are_those_of_the_constructor(kind):
             assert fields[key].default == default
 
 
+NOT_IN_FILES = {tasks.ForceTask, tasks.ImpedanceTask, tasks.AngularMomentumTask}
+"""Scenarios describe no surfaces to press on and no robots that stand."""
+
+
 def test_every_task_is_known_to_the_schema():
     known = {task for _, task in TASKS.values()}
     offered = {
@@ -109,7 +113,7 @@ def test_every_task_is_known_to_the_schema():
         for item in vars(tasks).values()
         if inspect.isclass(item) and issubclass(item, tasks.Task) and not inspect.isabstract(item)
     }
-    assert offered == known
+    assert offered - NOT_IN_FILES == known
 
 
 def choices(model, key):

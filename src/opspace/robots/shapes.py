@@ -13,12 +13,9 @@ from pathlib import Path
 from typing import TypeAlias
 
 import numpy as np
-import pinocchio as pin
 
 from opspace.errors import ModelError
 from opspace.robots.adapter import held_joints
-from opspace.robots.enclosing import enclosing_capsule
-from opspace.robots.pinocchio_model import model_from_urdf
 from opspace.robots.protocol import Robot
 from opspace.robots.urdf import read_urdf
 
@@ -107,6 +104,8 @@ def shapes_of(robot: Robot) -> tuple[LinkCapsule, ...]:
 
 @lru_cache(maxsize=256)
 def _enclosing(points: bytes) -> tuple[Triple, Triple, float]:
+    from opspace.robots.enclosing import enclosing_capsule  # noqa: PLC0415 - imports SciPy's solvers
+
     start, end, radius = enclosing_capsule(np.frombuffer(points).reshape(-1, 3))
     return _triple(start), _triple(end), radius
 
@@ -118,6 +117,10 @@ def _triple(x: np.ndarray) -> Triple:
 
 def _urdf_pieces(path: Path, robot: Robot) -> Iterator[tuple[str, np.ndarray | LinkCapsule]]:
     """Give the collision geometry of a URDF: capsules, or points (k, 3) whose hull a piece is [m]."""
+    import pinocchio as pin  # noqa: PLC0415 - slow, and only robots from URDF have it
+
+    from opspace.robots.pinocchio_model import model_from_urdf  # noqa: PLC0415
+
     free = robot.floating_base
     model = model_from_urdf(read_urdf(path, held_joints(robot), free), free)
     directories = [str(parent) for parent in path.resolve().parents[:PACKAGE_DEPTH]]
