@@ -53,7 +53,7 @@ def test_columns_are_found_by_name_and_group(tmp_path):
     rows = rows_of(5)
     write(tmp_path, rows)
     recording = load(tmp_path)
-    assert recording.names == tuple(column.name for column in COLUMNS)
+    assert tuple(recording) == recording.names == tuple(column.name for column in COLUMNS)
     assert recording.columns == COLUMNS
     assert recording.units["tau/joint1"] == "N·m"
     assert np.array_equal(recording.t, rows[:, 0])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
@@ -91,6 +91,10 @@ class Recording:
 
     def __contains__(self, name: object) -> bool:
         return name in self._index
+
+    def __iter__(self) -> Iterator[str]:
+        """Give the names of the columns, as tables of other libraries do."""
+        return iter(self._index)
 
     def __getitem__(self, name: str) -> np.ndarray:
         """Look up one column.
