@@ -76,8 +76,8 @@ OPTION_SIZE = 20
 
 # What a tick answers when there is no torque.
 STATE_NOT_FINITE, NOT_FINITE, NOT_POSITIVE_DEFINITE = -1, -2, -3
-SOLVE = 2 * int(Status.COLLISION_LOST)
-"""What a hard torque counts in its answer, above every combination of statuses without contacts."""
+SOLVE = 2 * max(map(int, Status))
+"""What a hard torque counts in its answer, above every combination of statuses."""
 
 
 def slot_bit(k: int) -> int:
