@@ -32,7 +32,7 @@ HALF, OFFSET = (0.085, 0.025), (0.035, 0.0, -0.035)
 END = 5.4
 MOMENTS = (0.1, 2.55, 5.3)
 """Times of the pictures, s."""
-SIZE = (420, 560)
+SIZE = (315, 420)
 CHANGES = {"foot lets go": 2.5, "hand comes in": 4.2}
 BETWEEN = 10
 """Ticks from one row of the CSV file to the next."""
@@ -125,8 +125,8 @@ def rendered(lift: Lift) -> list[np.ndarray]:
 
 def draw(rows: list[dict[str, str]], images: list[np.ndarray]) -> None:
     """Draw the robot above the force of the foot and the torque steps."""
-    figure = new_figure(6.6)
-    grid = figure.add_gridspec(3, 3, height_ratios=(2.3, 1.0, 1.0))
+    figure = new_figure(5.6)
+    grid = figure.add_gridspec(3, 3, height_ratios=(1.8, 1.0, 1.0))
     for k, (image, moment) in enumerate(zip(images, MOMENTS, strict=True)):
         panel = figure.add_subplot(grid[0, k])
         panel.imshow(image)
