@@ -176,6 +176,7 @@ MISTAKES = [
     ("    type: joint\n", "", "tasks.wrist.type", "is missing (valid: position, "),
     ("[0.4, 0.1, 0.9]", "[0.4, 0.1]", "tasks.reach.target", "3 numbers [m]"),
     ("[0, 1, 0, 0]", "[0, 1, 0, 1]", "tasks.turn.target.goal", "norm 1, not 1.41421"),
+    ("[0, 1, 0, 0]", "[0, 1, 0, 1e200]", "tasks.turn.target.goal", "norm 1, not 1e+200"),
     ("minimum_jerk", "minimal_jerk", "tasks.turn.target.type", "did you mean 'minimum_jerk'"),
     ("minimum_jerk", "circle", "tasks.turn.target.type", "valid: hold, minimum_jerk, out"),
     ("duration: 2\n", "offset: [0, 0, 1]\n", "tasks.turn.target.duration", "is missing (time"),

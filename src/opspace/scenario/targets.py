@@ -6,6 +6,7 @@ begin with a step. ``goal`` is where it leads, ``offset`` says the same relative
 
 from __future__ import annotations
 
+import math
 from itertools import pairwise
 from typing import TYPE_CHECKING, Annotated, Any, Generic, Literal, TypeVar
 
@@ -41,7 +42,7 @@ PoseValue = Annotated[
 def _check_quaternion(value: Any) -> tuple[float, ...]:
     numbers = Number("quaternion w x y z", size=4, otherwise=_OR_REFERENCE).check(value)
     assert isinstance(numbers, tuple)
-    norm = sum(number**2 for number in numbers) ** 0.5
+    norm = math.hypot(*numbers)
     if abs(norm - 1.0) > QUATERNION_TOLERANCE:
         raise problem(f"must be a quaternion w x y z of norm 1, not {norm:.6g}: {shown(value)}")
     return numbers
