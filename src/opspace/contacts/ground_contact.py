@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from opspace.errors import InputError, unknown_name
 from opspace.law.contact_forces import NORMAL, ForceSet
+from opspace.law.scalars import STILLING
 from opspace.tasks.known_attributes import KnownAttributes
 from opspace.tasks.rotation import cross, skew
 from opspace.tasks.validation import Array, finite_array
@@ -19,8 +20,6 @@ from opspace.tasks.validation import Array, finite_array
 if TYPE_CHECKING:
     from opspace.robots.protocol import Robot
 
-STILLING = 20.0
-"""Rate at which what is left of a contact's motion is taken away, 1/s."""
 STIFF = 1e3
 """How much harder a contact keeps a force that is wanted of it than one that nobody asked for."""
 MOST_WEIGHTS = 3.0
@@ -117,6 +116,11 @@ class GroundContact(KnownAttributes, ABC):
         self._force = wanted
 
     @property
+    def frame_id(self) -> int:
+        """Number of its frame on the robot, −1 before it is bound."""
+        return self._id
+
+    @property
     def max_force(self) -> float:
         """Largest normal force, N; where none is given three weights of the robot, once bound."""
         return MOST_WEIGHTS * self._weight if self._most is None else self._most
@@ -172,14 +176,20 @@ class GroundContact(KnownAttributes, ABC):
         Returns:
             The force set.
         """
+        metric, reference = self.shares()
+        return ForceSet(terms.J, self.cone(), metric, activation, self.max_force, reference)
+
+    def shares(self) -> tuple[Array, Array]:
+        """Return the diagonal of R with which it takes part in sharing, and the force wanted of it.
+
+        Returns:
+            R, (m,), and λ_ref, (m,) N and N·m.
+        """
         reference = np.zeros(self.rows)
         force = self._force
         if force is not None:
             reference[:3] = force
-        stiff = 1.0 if force is None else STIFF
-        return ForceSet(
-            terms.J, self.cone(), stiff * self.metric(), activation, self.max_force, reference
-        )
+        return (1.0 if force is None else STIFF) * self.metric(), reference
 
     @abstractmethod
     def cone(self) -> Array:

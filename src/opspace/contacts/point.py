@@ -52,6 +52,11 @@ class PointContact(GroundContact):
         x /= np.linalg.norm(x)
         self._surface = np.stack([x, np.cross(z, x), z], axis=1)
 
+    @property
+    def surface(self) -> Array:
+        """Axes of the surface in the world, (3, 3), as columns, z out of it."""
+        return self._surface
+
     def cone(self) -> Array:
         """Return the rows of the friction pyramid, (4, 3)."""
         return point_cone(self.friction)

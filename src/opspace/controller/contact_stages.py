@@ -22,7 +22,14 @@ from opspace.law.contact_forces import (
     realise,
     share,
 )
-from opspace.law.scalars import MOST_WEIGHT
+from opspace.law.scalars import (
+    BARELY,
+    FALLING,
+    LEVER,
+    MAY_GIVE_UP,
+    NOTICED,
+    entering_weight,
+)
 from opspace.stack import ContactMember
 from opspace.tasks.activations import checked_activation
 
@@ -31,20 +38,8 @@ if TYPE_CHECKING:
 
 GROUND = TOP - 1
 """Priority of contacts: above joint limits, for they are physics."""
-NEVER_SINGULAR = 1e-6
+NEVER_SINGULAR = 1e-12
 """Reference of σ for contacts: no buffer fades what the ground holds."""
-ENTERING = 100.0 * MOST_WEIGHT
-"""Weight in the metric of a contact on its way in."""
-HARDEST = 1e4
-"""Where h/(1 − h) ends, with which that grows."""
-LEVER = 0.1
-"""Moment that counts like a force, over that force, m."""
-MAY_GIVE_UP = 0.01
-"""Part of the weight that a removal may cost before the contact waits."""
-BARELY = 1e-6
-"""Part of the largest force below which nothing presses."""
-NOTICED, FALLING = 1e-3, 0.3
-"""Parts of the weight from which a wrench counts as given up, and from which the robot falls."""
 
 
 class Footing(NamedTuple):
@@ -143,7 +138,7 @@ def entering(touches: Sequence[Footing], L: np.ndarray) -> np.ndarray:
         h = touch.motion
         if 0.0 < h < 1.0:
             J = np.linalg.solve(L, touch.terms.J.T).T
-            W += ENTERING * min(h / (1.0 - h), HARDEST) * (J.T @ J)
+            W += entering_weight(h) * (J.T @ J)
     return W
 
 

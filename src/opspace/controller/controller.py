@@ -19,6 +19,7 @@ from opspace.controller.watchdog import Watchdog
 from opspace.controller.wrenches import Wrenches
 from opspace.errors import InputError
 from opspace.kernels.columns import (
+    BASE,
     DAMPING,
     KEEP_TORQUE,
     OPTION_SIZE,
@@ -37,6 +38,7 @@ from opspace.kernels.columns import (
 )
 from opspace.law import PROFILES
 from opspace.plan.entries import KERNELS
+from opspace.plan.pack_contacts import Footing, PackedContacts, fits
 from opspace.plan.plan import Heritage, Plan, structure
 from opspace.plan.read_report import CompiledReport
 from opspace.robots.adapter import AdapterBase
@@ -60,7 +62,10 @@ STATUSES = _Statuses()
 NEW = tuple.__new__
 KEPT = 32
 """Plans that are kept for stacks to come again."""
+ROOM_FOR = 6
+"""Contacts that there is room for from the start; more make room once."""
 TIME_JUMP, FAULT = int(Status.TIME_JUMP), int(Status.FAULT)
+CONTACT_WAITS = int(Status.CONTACT_WAITS)
 
 _Fixed: TypeAlias = tuple[
     AdapterBase,
@@ -68,6 +73,7 @@ _Fixed: TypeAlias = tuple[
     Callable[[], None] | None,
     Watchdog | None,
     Callable[[float], tuple[Member, ...]],
+    bool,
     DisturbanceObserver | None,
     Callable[[float, int], int],
 ]
@@ -91,6 +97,7 @@ class Controller(ReferenceController):
     _plan: Plan | None = None
     _bodies: RigidModel | None = None
     _batch: Batch | None = None
+    _standing: PackedContacts | None = None  # what a robot with a floating base touches
     # What every tick needs, in one piece: reading an attribute takes as long as a line of local names.
     _fixed: _Fixed | None = None
     _laid_out: _LaidOut | None = None
@@ -100,7 +107,7 @@ class Controller(ReferenceController):
     _ready: Mapping[tuple[object, ...], Plan] = MappingProxyType({})
     _ahead: Mapping[int, tuple[Heritage, _LaidOut]] = MappingProxyType({})
 
-    def step(  # noqa: PLR0912 - one piece is fast
+    def step(  # noqa: PLR0912, PLR0915 - one piece is fast
         self, t: float, q: ArrayLike, v: ArrayLike, *, wrenches: Wrenches | None = None
     ) -> Command:
         """Compute the torque for one state; see `ReferenceController.step`."""
@@ -110,7 +117,7 @@ class Controller(ReferenceController):
             fixed = self._fixed
             if fixed is None:
                 return super().step(t, q, v, wrenches=wrenches)
-        robot, place, catch_up, watch, begin_tick, observer, tick = fixed
+        robot, place, catch_up, watch, begin_tick, stands, observer, tick = fixed
         if type(t) is not float or not isfinite(t):
             t = finite(t, "time")
         if self._loading is not None:
@@ -133,6 +140,9 @@ class Controller(ReferenceController):
         members = begin_tick(t)
         if wrenches is not None or self._forces is not None:
             timing |= int(self._sensed(t, wrenches, members))
+        footing = ()
+        if stands:
+            timing |= self._touch(t)
         laid_out = self._laid_out
         if laid_out is None or members is not laid_out[0]:
             laid_out = self._lay_out(members)
@@ -150,10 +160,13 @@ class Controller(ReferenceController):
             if answer == STATE_NOT_FINITE:
                 robot.check_state(robot.q, robot.v)
             return self._hold(t, STATUSES[timing | FAULT])
+        tau = torque()
+        if stands:
+            footing = self._stood(tau)
         status = STATUSES[answer % SOLVE | timing]
         # Bytes are copied in half the time of an array; the tuple's own constructor takes twice this.
         command = NEW(
-            Command, (t, torque(), status, answer // SOLVE, CompiledReport(plan, memory()))
+            Command, (t, tau, status, answer // SOLVE, CompiledReport(plan, memory(), footing))
         )
         return command if self._plain else self._finished(command, members)
 
@@ -249,12 +262,15 @@ class Controller(ReferenceController):
         if self._axes is None or not isinstance(robot, AdapterBase):
             return 0.0
         seconds = KERNELS.load()
+        if self._base:
+            self._standing = self._contacts_of(self._axes, len(self.stack.contacts))
         self._fixed = (
             robot,
-            robot.place,
+            robot.place_turned if self._base else robot.place,
             robot.catch_up if self._bodies is None else None,
             self._timing,
             self.stack.begin_tick,
+            self._base > 0,
             self._observer,
             KERNELS["tick"],
         )
@@ -266,18 +282,15 @@ class Controller(ReferenceController):
         robot = self.robot
         if self._not_compiled():
             return None
-        axes = robot.motion_axes() if isinstance(robot, AdapterBase) else None
-        if axes is None or not isinstance(robot, AdapterBase):
+        if not isinstance(robot, AdapterBase):
             return None
         model = self._bodies = robot.rigid_model()
         if model is None:
-            return axes
+            return robot.motion_axes()
         return model.motion_axes(make_dynamics(model.bodies), *robot.state)
 
     def _not_compiled(self) -> str:
         """Name what somebody wrote that compiled code cannot call, empty where there is nothing."""
-        if self._base:
-            return "the readable tick of a floating base"
         limits = self.stack.limits
         if limits is not None and limits.overridden:
             return f"the law of {type(limits).__name__}"
@@ -328,7 +341,9 @@ class Controller(ReferenceController):
         self._ready, self._ahead = ready, ahead
 
     def _lay_out(self, members: tuple[Member, ...]) -> _LaidOut | None:
-        """Take up the plan for these tasks, or None where there are too many of them."""
+        """Take up the plan for these tasks, or None where compiled code cannot tick with them."""
+        if self._base and not fits(self.stack.touching):
+            return None
         found = self._ahead.get(id(members))
         if found is None or not found[0].holds(self._plan) or not self._watches_all(found[1][1]):
             found = self._laid_out_now(members)
@@ -363,6 +378,37 @@ class Controller(ReferenceController):
             self._plan.leave(members, self._blending)
         self._plan, self._laid_out, self._readable = None, None, True
 
+    def _touch(self, t: float) -> int:
+        """Move contacts on to time ``t`` [s] and pack them; tell whether one waits.
+
+        Contacts that compiled code cannot evaluate, and more than there is room for, take the plan.
+        """
+        members, standing = self.stack.begin_contacts(t), self._standing
+        assert standing is not None
+        assert self._axes is not None
+        if not fits(members):
+            self._laid_out = None
+            return 0
+        if len(members) > standing.most:
+            standing = self._standing = self._contacts_of(self._axes, len(members))
+            self._laid_out = None
+        waits = standing.begin(members, self.robot, t)
+        return CONTACT_WAITS if waits else 0
+
+    def _stood(self, tau: np.ndarray) -> tuple[Footing, ...]:
+        """Learn what a tick gave up, and tell which contacts it had."""
+        standing = self._standing
+        assert standing is not None
+        self._last_torque = tau
+        self.stack.hinder(standing.hindrance)
+        return standing.footing
+
+    def _contacts_of(self, axes: MotionAxes, known: int) -> PackedContacts:
+        asked = self.torque_limits == "priority"
+        room = np.array(self.robot.torque_limit) if asked else np.full(axes.v.size, np.inf)
+        room[: self._base] = np.inf
+        return PackedContacts(axes, max(known, ROOM_FOR), room)
+
     def _planned(self, members: tuple[Member, ...], axes: MotionAxes) -> Plan:
         return Plan(
             members,
@@ -373,10 +419,13 @@ class Controller(ReferenceController):
             self._options(),
             self._blending,
             self._collisions,
+            self._standing,
         )
 
     def _watches_all(self, plan: Plan) -> bool:
-        """Tell whether a plan knows of all obstacles that there are now."""
+        """Tell whether a plan knows of all obstacles that there are now, and has room for contacts."""
+        if plan.contacts is not self._standing:
+            return False
         if self._collisions is None or plan.distances is None:
             return True
         return plan.distances.layout is self._collisions.layout()
@@ -399,7 +448,9 @@ class Controller(ReferenceController):
         option[TASK_BIAS] = float(self.bias == "task")
         option[ROOM], option[REACH] = self._blending.room, self._blending.reach
         option[PERIOD] = self._rules.period
-        option[KEEP_TORQUE] = float(self.torque_limits == "priority")
+        # On the ground the motors' limits act behind the law, together with those of the forces.
+        option[KEEP_TORQUE] = float(self.torque_limits == "priority" and not self._base)
+        option[BASE] = float(self._base)
         return option
 
 

@@ -78,6 +78,7 @@ def _check(controller: ReferenceController) -> None:
     """Refuse by name what ticks of Python do and the exported one would leave out."""
     stack, limits = controller.stack, controller.stack.limits
     reasons = {
+        "a floating base: contacts come and go in Python only": controller._base > 0,
         "collisions: what is kept apart may move in Python only": controller.collisions is not None,
         "on_time_jump other than 'report'": controller._holds
         or (controller._timing is not None and controller._timing.policy != "report"),

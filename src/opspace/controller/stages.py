@@ -242,7 +242,8 @@ def balance(k: Given, h: Sequence[float], terms: Sequence[TaskTerms]) -> Given:
         return k
     reaction = np.add.reduce(carried)
     part = 1.0
-    if k.rules.keep_torque and k.rules.bias == "joint":
+    # On the ground the motors' limits act behind the law, together with those of the forces.
+    if k.rules.keep_torque and k.rules.bias == "joint" and not k.base:
         part = room_for(reaction, start_inside(k), k.torque_limit)
         reaction = part * reaction
     return replace(k, bias=k.bias + reaction, reaction=reaction, part=part)

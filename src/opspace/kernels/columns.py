@@ -71,8 +71,9 @@ VARIABLE_SIZE = 9
     LIMIT_BUFFER,
     KEEP_TORQUE,
     PERIOD,
-) = range(20)
-OPTION_SIZE = 20
+    BASE,
+) = range(21)
+OPTION_SIZE = 21
 
 # What a tick answers when there is no torque.
 STATE_NOT_FINITE, NOT_FINITE, NOT_POSITIVE_DEFINITE = -1, -2, -3

@@ -38,6 +38,7 @@ from opspace.kernels.limit_columns import (
     SPEED,
 )
 from opspace.kernels.projection import nearest_acceleration, task_metric
+from opspace.kernels.task_rows import joint_position
 from opspace.law.scalars import BROKEN, LOST, UNBOUNDED
 from opspace.machine.jit import jit
 
@@ -57,7 +58,7 @@ def begin_limits(work):
         j = work.limit_joint[i]
         limit[COMMAND] = limit_command(
             int(option[LIMIT_LAW]),
-            limit[SIGN] * (limit[POSITION] - work.q[j]),
+            limit[SIGN] * (limit[POSITION] - joint_position(work, j)),
             limit[SIGN] * work.v[j],
             limit[BRAKE],
             limit[SPEED],
@@ -77,7 +78,7 @@ def begin_limits(work):
 def stop(work, limit, j):
     """Ask more of a joint that is too fast, as much as its motors give while they hold the others."""
     k1, period = work.option[LIMIT_K1], work.option[PERIOD]
-    d, towards = limit[SIGN] * (limit[POSITION] - work.q[j]), limit[SIGN] * work.v[j]
+    d, towards = limit[SIGN] * (limit[POSITION] - joint_position(work, j)), limit[SIGN] * work.v[j]
     if towards <= 0.0:
         return
     if stopping_command(d, towards, limit[BRAKE], math.inf, k1, period) == math.inf:
@@ -108,7 +109,7 @@ def insert_limits(work):
         j = work.limit_joint[i]
         work.limit_h[i] = limit_presence(
             int(option[LIMIT_LAW]),
-            limit[SIGN] * (limit[POSITION] - work.q[j]),
+            limit[SIGN] * (limit[POSITION] - joint_position(work, j)),
             limit[SIGN] * work.v[j],
             limit[BRAKE],
             option[LIMIT_BUFFER],
@@ -164,12 +165,12 @@ def realise(work, stacks, n):
     Returns:
         What happened, in the numbers of `opspace.Status`.
     """
-    _bounds(work, n)
+    find_bounds(work, n)
     for i in range(work.distance_taken.shape[0]):
         work.distance_taken[i] = 0.0
-    outside = _motors_exceeded(work, n) or _excess(work, n) > BROKEN
+    outside = _motors_exceeded(work, n) or find_excess(work, n) > BROKEN
     if not (outside or approach(work) > BROKEN):
-        return LIMIT_LOST if _will_pass(work) else 0
+        return LIMIT_LOST if will_pass(work) else 0
     task_metric(work, stacks)
     x = work.joint_acceleration
     nearest_acceleration(work.inertia, x, work.bounds, work.distances)
@@ -201,13 +202,13 @@ def _acting(work, n):
             bits |= COLLISION
     if approach(work) > LOST:
         bits |= COLLISION_LOST
-    if _excess(work, n) > LOST or _will_pass(work):
+    if find_excess(work, n) > LOST or will_pass(work):
         bits |= LIMIT_LOST
     return bits
 
 
 @jit
-def _will_pass(work):
+def will_pass(work):
     """Whether a joint that is too fast does not brake enough to stop at its limit."""
     for i in range(work.limit.shape[0]):
         limit = work.limit[i]
@@ -238,7 +239,7 @@ def _motors_exceeded(work, n):
 
 
 @jit
-def _excess(work, n):
+def find_excess(work, n):
     """The largest excess over what a joint may do, see `opspace.law.excess`."""
     most = -math.inf
     x, lower, upper = work.joint_acceleration, work.bounds.lower, work.bounds.upper
@@ -251,7 +252,7 @@ def _excess(work, n):
 
 
 @jit
-def _bounds(work, n):
+def find_bounds(work, n):
     """Least and largest acceleration, and torque beside the bias, of every joint."""
     bounds = work.bounds
     for a in range(n):

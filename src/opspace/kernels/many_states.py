@@ -27,8 +27,10 @@ def ticks(t, work, states, first, end):
     n = work.v.shape[0]
     Q, V, own, tau = states.Q, states.V, states.own, states.tau
     for i in range(first, end):
+        for a in range(work.q.shape[0]):
+            work.q[a] = Q[i, a]
         for a in range(n):
-            work.q[a], work.v[a] = Q[i, a], V[i, a]
+            work.v[a] = V[i, a]
         begin_state(work, states.before, own[i if own.shape[0] > 1 else 0])
         if tick(t, work) < 0:
             brake(work, tau[i])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from opspace.kernels.columns import (
+    BASE,
     BODY,
     CENTRE_OF_MASS,
     JOINT,
@@ -14,6 +15,7 @@ from opspace.kernels.columns import (
     RELATIVE,
     SOURCE,
 )
+from opspace.kernels.contact_columns import BASE_SIZE
 from opspace.machine.jit import jit
 
 # Columns of Tick.motion: rotation by rows, position, velocity, drift.
@@ -32,7 +34,8 @@ def cross_add(out, i, ax, ay, az, bx, by, bz):
 def move_joints(work):
     """Velocity and drift (n, 6) of the body behind every joint, seen at the origin of the world.
 
-    V_j = V_parent + s_j v_j,  A_j = A_parent + (V_j × s_j) v_j: an axis s_j moves with its body.
+    V_j = V_parent + s_j v_j,  A_j = A_parent + (V_j × s_j) v_j: an axis s_j moves with its body. The
+    three axes about which a floating base turns all move with the base.
     """
     axes, velocity, acceleration = work.axes, work.velocity, work.acceleration
     for j in range(work.v.shape[0]):
@@ -54,12 +57,30 @@ def move_joints(work):
         if p >= 0:
             for i in range(6):
                 a[i] += acceleration[p, i]
+        if j == BASE_SIZE - 1 and work.option[BASE] != 0.0:
+            _move_base(work)
+
+
+@jit
+def _move_base(work):
+    """Drift of a floating base: the point of it at the origin of the world moves and turns, v × ω."""
+    A, V = work.acceleration[BASE_SIZE - 1], work.velocity[BASE_SIZE - 1]
+    before = work.velocity[2]
+    for i in range(6):
+        A[i] = 0.0
+    cross_add(A, 0, before[0], before[1], before[2], V[3], V[4], V[5])
 
 
 @jit
 def place_frame(work, i, m, body, joint, local, offset):
     """Motion of a frame of task i into row m of ``motion`` (3, 24): x, ẋ = J v, J̇ v in world axes."""
-    x, number = work.motion[m], work.numbers[i]
+    place_point(work, work.numbers[i], m, body, joint, local, offset)
+
+
+@jit
+def place_point(work, number, m, body, joint, local, offset):
+    """Motion of a point that some numbers describe, as those of a task do."""
+    x = work.motion[m]
     for row in range(3):
         for column in range(3):
             total = number[local + 3 * column + row]

@@ -69,7 +69,7 @@ def nearest_acceleration(inertia, acceleration, bounds, distances):
         distances.held[i] = 0
     count = _take_in(inertia, acceleration, count, n, bounds, distances)
     while True:
-        _clean(count, n, bounds)
+        clean(count, n, bounds)
         for a in range(n):
             acceleration[a] = bounds.y[a]
         solve_lower_transposed(bounds.C, n, acceleration)
@@ -81,7 +81,7 @@ def nearest_acceleration(inertia, acceleration, bounds, distances):
 
 
 @jit
-def _clean(count, n, bounds):
+def clean(count, n, bounds):
     """Project z several times, what softness leaves of an excess included."""
     for a in range(n):
         bounds.x[a] = bounds.z[a]

@@ -51,11 +51,17 @@ def evaluate_tasks(work):
 
 
 @jit
+def joint_position(work, j):
+    """Position of the joint with velocity coordinate j; before it is a quaternion of one number more."""
+    return work.q[j + work.q.shape[0] - work.v.shape[0]]
+
+
+@jit
 def _joint_task(work, i):
     """f* = a_d + kv (v_d − v) + kp (q_d − q) of the chosen joints."""
     first, rows = work.kind[i, FIRST_ROW], work.kind[i, ROWS]
     for row in range(first, first + rows):
-        work.error[row] = work.goal[row, 0] - work.q[work.coordinate[row]]
+        work.error[row] = work.goal[row, 0] - joint_position(work, work.coordinate[row])
         work.drift[row] = 0.0
     _leave_out_turns(work, i, first, rows)
     scale = 1.0

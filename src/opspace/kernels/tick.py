@@ -7,6 +7,7 @@ import math
 from opspace.command import Status
 from opspace.kernels.balance import balance
 from opspace.kernels.columns import (
+    BASE,
     COVERS_ALL,
     DAMPING,
     FIRST_ROW,
@@ -30,6 +31,8 @@ from opspace.kernels.columns import (
     WORLD,
 )
 from opspace.kernels.compiled_scalars import leaning, ramp
+from opspace.kernels.contact_forces import stand
+from opspace.kernels.contact_rows import close_contacts, contact_corners, evaluate_contacts
 from opspace.kernels.corners import corners, insert, sort_corners
 from opspace.kernels.distances import measure_distances
 from opspace.kernels.dynamics import evaluate
@@ -84,13 +87,17 @@ def tick(t, work):
         begin_limits(work)
         if insert_limits(work):
             limit_stacks = limit_corners(work)
-    law(work, stacks, limit_stacks)
-    torque(work)
-    measure_distances(work)
-    kept = keep_bounds(work, stacks)
+    evaluate_contacts(work)
+    closings = law(work, stacks, limit_stacks)
+    if work.option[BASE] != 0.0:
+        kept = stand(work, stacks, closings)
+    else:
+        torque(work)
+        measure_distances(work)
+        kept = keep_bounds(work, stacks)
     if not _finite(work.tau):
         return NOT_FINITE
-    return (status(work) | kept) + SOLVE * stacks * max(limit_stacks, 1)
+    return (status(work) | kept) + SOLVE * closings * stacks * max(limit_stacks, 1)
 
 
 @jit
@@ -238,6 +245,10 @@ def law(work, stacks, limit_stacks):
     """û = Σ_T w_T H(T; f̃) of the stacks, under the joint limits that take part (Eq. 20, Eq. 23).
 
     Reads Jw, fw, the corners and rest; writes u (n,), √J/s, and what `SPACE` keeps for the report.
+    What a robot stands on is above the limits.
+
+    Returns:
+        Number of corners in which contacts close, 1 without any.
     """
     n = work.v.shape[0]
     space = work.space
@@ -249,13 +260,27 @@ def law(work, stacks, limit_stacks):
     for a in range(n):
         work.u[a] = 0.0
     begin(n, levels, space)
+    if work.option[BASE] == 0.0:
+        _above_tasks(work, 1.0, stacks, limit_stacks, levels)
+        return 1
+    closings = contact_corners(work)
+    for c in range(closings):
+        close_contacts(work, work.stance.corner_links[c])
+        _above_tasks(work, work.stance.corner_weight[c], stacks, limit_stacks, levels)
+    return closings
+
+
+@jit
+def _above_tasks(work, weight, stacks, limit_stacks, levels):
+    """Add the stacks below the joint limits that take part, with some weight."""
+    space = work.space
     if limit_stacks == 0:
-        pass_on(0, n, space)
-        space.path[1] = 1.0
+        pass_on(0, work.v.shape[0], space)
+        space.path[1] = weight
         _walk(work, stacks, levels)
         return
     for c in range(limit_stacks):
-        _under_limits(work, c, stacks, levels)
+        _under_limits(work, c, weight * work.limit_weight[c], stacks, levels)
 
 
 @jit
@@ -268,8 +293,8 @@ def _walk(work, stacks, levels):
 
 
 @jit
-def _under_limits(work, c, stacks, levels):
-    """Add the stacks below one corner of the joint limits."""
+def _under_limits(work, c, weight, stacks, levels):
+    """Add the stacks below one corner of the joint limits, with its weight."""
     n = work.v.shape[0]
     space = work.space
     first = work.Jw.shape[0] - work.limit.shape[0]
@@ -280,13 +305,13 @@ def _under_limits(work, c, stacks, levels):
             count += 1
     if count == 0:
         pass_on(0, n, space)
-        space.path[1] = work.limit_weight[c]
+        space.path[1] = weight
         _walk(work, stacks, levels)
         return
     project(0, count, n, work.Jw, work.fw, space)
     alternatives = solve_level(0, count, n, work.Jw, False, work.option, space)
     if alternatives == 1:
-        keep_inside(0, n, work.limit_weight[c], space)
+        keep_inside(0, n, weight, space)
     for i in range(alternatives):
         share = 1.0
         if alternatives > 1:
@@ -294,8 +319,8 @@ def _under_limits(work, c, stacks, levels):
             if share <= 0.0:
                 continue
             take_alternative(0, i, n, space)
-            keep_inside(0, n, work.limit_weight[c] * share, space)
-        space.path[1] = work.limit_weight[c] * share
+            keep_inside(0, n, weight * share, space)
+        space.path[1] = weight * share
         _walk(work, stacks, levels)
 
 

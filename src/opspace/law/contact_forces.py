@@ -16,20 +16,20 @@ from jaxtyping import Float
 
 from opspace.law.blending import Weighted
 from opspace.law.nearest import nearest_within
-from opspace.law.scalars import BROKEN, HARD, RANK_TOLERANCE, SOFT
+from opspace.law.scalars import (
+    BROKEN,
+    HARD,
+    LEAST_REGULAR,
+    MOTOR_SOFT,
+    NEARNESS,
+    RANK_TOLERANCE,
+    REFINEMENTS,
+    SOFT,
+    UNMOVED,
+)
 
 NORMAL = 2
 """Component of a contact's force that points out of the surface."""
-NEARNESS = 3e-2
-"""How much the nearness of the forces counts beside that of the motion: it keeps the answer from
-turning sharply where a limit comes to act, and costs nothing while none does."""
-REGULAR = 1e-9
-"""Part of the trace that is added where forces are shared, and refined away again."""
-REFINEMENTS = 2
-UNMOVED = 1e-10
-"""A bound whose row the equations of motion leave less of than this part is out of reach."""
-MOTOR_SOFT = 1e-10
-"""How soft bounds on torques are beside cones, which are physics."""
 
 
 class ForceSet(NamedTuple):
@@ -160,7 +160,7 @@ def _least(
 ) -> Float[np.ndarray, " m"]:
     """Find the least force in the metric R with G λ = w, without deciding on a rank."""
     S = (G / R) @ G.T
-    S[np.diag_indices_from(S)] += REGULAR * np.trace(S)
+    S[np.diag_indices_from(S)] += LEAST_REGULAR * np.trace(S)
     found = np.zeros(R.size)
     for _ in range(1 + REFINEMENTS):
         found += (G.T @ np.linalg.solve(S, w - G @ found)) / R
@@ -329,7 +329,7 @@ def _nearness(wish: Wish, sets: Sequence[ForceSet], moves: Float[np.ndarray, "n 
     """
     E = (wish.L @ moves)[: wish.base]
     A = E @ E.T
-    A[np.diag_indices_from(A)] += REGULAR * np.trace(A)
+    A[np.diag_indices_from(A)] += LEAST_REGULAR * np.trace(A)
     cause = resist = 0.0
     for one in sets:
         G = one.J[:, : wish.base].T

@@ -493,3 +493,36 @@ def room_for(part: np.ndarray, torque: np.ndarray, limit: np.ndarray) -> float:
         if asked > room:
             s = min(s, room / asked)
     return s
+
+
+# --- Contacts of a floating base, see `opspace.law.contact_forces` ----------------------------------
+
+STILLING = 20.0
+"""Rate at which what is left of a contact's motion is taken away, 1/s."""
+NEARNESS = 3e-2
+"""How much the nearness of the forces counts beside that of the motion: it keeps the answer from
+turning sharply where a limit comes to act, and costs nothing while none does."""
+LEAST_REGULAR = 1e-9
+"""Part of the trace that is added where forces are shared, and refined away again."""
+REFINEMENTS = 2
+UNMOVED = 1e-10
+"""A bound whose row the equations of motion leave less of than this part is out of reach."""
+MOTOR_SOFT = 1e-10
+"""How soft bounds on torques are beside cones, which are physics."""
+ENTERING = 100.0 * MOST_WEIGHT
+"""Weight in the metric of a contact on its way in."""
+HARDEST = 1e4
+"""Where h/(1 − h) ends, with which that grows."""
+LEVER = 0.1
+"""Moment that counts like a force, over that force, m."""
+MAY_GIVE_UP = 0.01
+"""Part of the weight that a removal may cost before the contact waits."""
+BARELY = 1e-6
+"""Part of the largest force below which nothing presses."""
+NOTICED, FALLING = 1e-3, 0.3
+"""Parts of the weight from which a wrench counts as given up, and from which the robot falls."""
+
+
+def entering_weight(h: float) -> float:
+    """Weigh in the metric the rows of a contact that is on its way in, at 0 < h < 1."""
+    return ENTERING * min(h / (1.0 - h), HARDEST)

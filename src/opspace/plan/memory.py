@@ -8,9 +8,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from opspace.kernels.contact_columns import SOLE_ROWS
 from opspace.machine.field_table import Block, Record
+from opspace.plan.bound_records import BOUNDS
+from opspace.plan.contact_records import no_stance
 from opspace.plan.distance_records import DISTANCES
-from opspace.plan.records import BOUNDS, INERTIA, SPACE, TICK
+from opspace.plan.records import INERTIA, SPACE, TICK
 from opspace.robots.motion_axes import MotionAxes
 
 
@@ -29,10 +32,12 @@ class Sizes(NamedTuple):
     balls: int = 0
     sets: int = 0
     distances: int = 0
+    contacts: int = 0
 
     def by_name(self) -> dict[str, int]:
         """Return them as the tables of `opspace.plan.records` take them."""
-        return {**self._asdict(), "widest": max(self.rows + self.limits, self.n, 1)}
+        widest = max(self.rows + self.limits, self.n, SOLE_ROWS * self.contacts, 1)
+        return {**self._asdict(), "widest": widest}
 
 
 class Reported:
@@ -74,7 +79,11 @@ def _places(size: Sizes) -> dict[str, tuple[int, int, type, tuple[int, ...]]]:
 
 
 def make_tick(
-    size: Sizes, axes: MotionAxes, torque_limit: np.ndarray, option: np.ndarray
+    size: Sizes,
+    axes: MotionAxes,
+    torque_limit: np.ndarray,
+    option: np.ndarray,
+    stance: Record | None = None,
 ) -> tuple[Record, np.ndarray]:
     """Make the arrays of a tick.
 
@@ -83,6 +92,7 @@ def make_tick(
         axes: The robot's arrays.
         torque_limit: (n,) what the motors give, N·m.
         option: (OPTION_SIZE,) options of the controller.
+        stance: What the robot touches, a `STANCE`; None where it is bolted down.
 
     Returns:
         The arrays, a `TICK`, and the block that holds what is reported.
@@ -109,6 +119,7 @@ def make_tick(
         "later_inertia": make_inertia(_before(axes)),
         "bounds": BOUNDS.make(sizes),
         "distances": DISTANCES.make(sizes),
+        "stance": no_stance() if stance is None else stance,
     }
     return TICK.make(sizes, {**kept, **given}), block.memory
 

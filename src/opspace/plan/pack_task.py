@@ -104,10 +104,19 @@ def kind_of(task: Task) -> int:
     if isinstance(task, EVALUATED_IN_PYTHON):
         return OWN
     if isinstance(task, PostureTask):
-        return JOINTS if task.rows <= MOST_JOINTS else OWN
+        return JOINTS if task.rows <= MOST_JOINTS and _of_joints(task) else OWN
     assert isinstance(task, MotionTask)
     known_parts = type(task.source) in SOURCES and type(task.quantity) in QUANTITIES
     return MOTION if known_parts else OWN
+
+
+def _of_joints(task: PostureTask) -> bool:
+    """Tell whether a posture has nothing of a floating base, where q and v count differently."""
+    layout = task.layout
+    if layout is None:
+        return True
+    more = layout.nq - layout.J.shape[1]
+    return np.array_equal(layout.entries, layout.coordinates + more)
 
 
 def _overrides(task: Task, built_in: type[Task]) -> bool:

@@ -25,6 +25,7 @@ from opspace.law.scalars import NO_GROUP
 from opspace.machine.field_table import Record
 from opspace.machine.record import WORD
 from opspace.plan.memory import Sizes, make_tick
+from opspace.plan.pack_contacts import PackedContacts
 from opspace.plan.pack_distances import PackedDistances
 from opspace.plan.pack_task import Packed
 from opspace.plan.scales import Scales
@@ -81,6 +82,7 @@ class Plan:
         options: Numbers of the controller's options, (OPTION_SIZE,).
         blending: How activations are blended.
         guard: What is kept apart, or None.
+        contacts: What the robot touches, or None where it is bolted down.
     """
 
     def __init__(
@@ -93,6 +95,7 @@ class Plan:
         options: np.ndarray,
         blending: Blending,
         guard: CollisionAvoidance | None = None,
+        contacts: PackedContacts | None = None,
     ) -> None:
         self.members = members
         self.structure = structure(members)
@@ -120,8 +123,11 @@ class Plan:
             balls=0 if layout is None else layout.ball_frame.size,
             sets=0 if layout is None else layout.set_frame.size,
             distances=0 if layout is None else len(layout.rows),
+            contacts=0 if contacts is None else contacts.most,
         )
-        self.tick, self.memory = make_tick(self.size, axes, torque_limit, options)
+        self.contacts = contacts
+        stance = None if contacts is None else contacts.record
+        self.tick, self.memory = make_tick(self.size, axes, torque_limit, options, stance)
         self.packed = self._pack(scales)
         self.distances: PackedDistances | None = None
         if guard is not None and layout is not None:

@@ -19,6 +19,7 @@ from opspace.command import (
 from opspace.kernels.columns import slot_bit
 from opspace.plan.entries import KERNELS
 from opspace.plan.memory import Reported
+from opspace.plan.pack_contacts import Footing
 from opspace.plan.records import SPECTRUM
 
 if TYPE_CHECKING:
@@ -31,12 +32,14 @@ class CompiledReport:
     Args:
         plan: The plan of the tick.
         memory: The bytes of the block that the tick wrote.
+        footing: The contacts of the tick.
     """
 
-    __slots__ = ("_levels", "_memory", "_parts", "_plan", "_tasks")
+    __slots__ = ("_footing", "_levels", "_memory", "_parts", "_plan", "_tasks")
 
-    def __init__(self, plan: Plan, memory: bytes) -> None:
+    def __init__(self, plan: Plan, memory: bytes, footing: tuple[Footing, ...] = ()) -> None:
         self._plan = plan
+        self._footing = footing
         self._memory = memory
         self._parts: Reported | None = None
         self._tasks: dict[str, TaskStatus] | None = None
@@ -49,6 +52,7 @@ class CompiledReport:
             self.levels,
             dict(self.limits),
             dict(self.distances),
+            dict(self.contacts),
         )
 
     @property
@@ -76,8 +80,15 @@ class CompiledReport:
 
     @property
     def contacts(self) -> Mapping[str, ContactStatus]:
-        """Nothing: what has contacts takes the readable tick."""
-        return NO_CONTACTS
+        """Status of each contact by name."""
+        if not self._footing:
+            return NO_CONTACTS
+        found = self._found()
+        told = found["contact_force"], found["contact_axes"], found.numbers("contact_use")
+        return {
+            footing.contact.name: footing.status(force, axes, use)
+            for footing, force, axes, use in zip(self._footing, *told, strict=False)
+        }
 
     @property
     def distances(self) -> Mapping[str, Distance]:

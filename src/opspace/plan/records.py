@@ -14,6 +14,8 @@ from opspace.kernels.columns import (
     VARIABLE_SIZE,
 )
 from opspace.machine.field_table import Field, RecordTable
+from opspace.plan.bound_records import BOUNDS
+from opspace.plan.contact_records import STANCE
 from opspace.plan.distance_records import DISTANCES
 from opspace.robots.bodies import DYNAMICS, RIGID_BODIES
 
@@ -32,8 +34,9 @@ SIZES = {
     "balls": "balls of the robot that keep away from something",
     "sets": "convex sets that they keep away from",
     "distances": "pairs of a ball and a set",
+    "contacts": "contacts that can be there at once, none of a robot that is bolted down",
     "corners": "corners that the blend can have",
-    "widest": "the larger of rows + limits and n, at least one",
+    "widest": "the largest of rows + limits, n and 6 contacts, at least one",
     "states": "states of a batch",
     "given": "states that own activations are given for: one that stands for all, or all",
     "here": "rows of one level",
@@ -64,45 +67,6 @@ INERTIA = RecordTable(
     _work("inverse", ("n",), "one over its diagonal"),
     _plan("before", ("n",), "coordinate before each one, −1 for none", dtype=_INT),
     _plan("end", ("n",), "one after the last that each carries", dtype=_INT),
-)
-
-_BOUNDS = "4 n + distances"
-
-BOUNDS = RecordTable(
-    "Bounds",
-    "Bounds on accelerations and torques, and the memory to keep them.",
-    _work("lower", ("n",), "least accelerations", "rad/s²", start=-math.inf),
-    _work("upper", ("n",), "largest accelerations", "rad/s²", start=math.inf),
-    _work("least", ("n",), "least torques beside the bias", "N·m", start=-math.inf),
-    _work("most", ("n",), "largest torques beside the bias", "N·m", start=math.inf),
-    _work("W", ("n", "n"), "metric in x = Uᵀ q̈, see `opspace.law.task_metric`"),
-    _work("C", ("n", "n"), "its lower Cholesky factor"),
-    _work("normal", (_BOUNDS, "n"), "every bound as unit normal · z <= bound, in z = Cᵀ x"),
-    _work("size", (_BOUNDS,), "length of each normal before"),
-    _work(
-        "owner",
-        (_BOUNDS,),
-        "which of upper, lower, most, least, n each, then distances, it is",
-        dtype=_INT,
-    ),
-    _work(
-        "taken",
-        (_BOUNDS,),
-        "what each of these takes from its joint or distance",
-        "rad/s², N·m, m/s²",
-    ),
-    _work("bound", (_BOUNDS,), "the bounds", "√J/s"),
-    _work("softness", (_BOUNDS,), "their softness"),
-    _work("multiplier", (_BOUNDS,), "multipliers of the bounds", "√J/s"),
-    _work("wanted", (_BOUNDS,), "multipliers of those that hold, if alone", "√J/s"),
-    _work("active", (_BOUNDS,), "the bounds that hold", dtype=_INT),
-    _work("z", ("n",), "the point that the law wants", "√J/s"),
-    _work("x", ("n",), "the point that is projected", "√J/s"),
-    _work("y", ("n",), "its projection", "√J/s"),
-    _work("row", ("n",), "a normal before it has unit length"),
-    _work("r", (_BOUNDS,), "right-hand side of the multipliers", "√J/s"),
-    _work("G", (_BOUNDS, _BOUNDS), "products of the normals that hold"),
-    _work("factor", (_BOUNDS, _BOUNDS), "Cholesky factor of G"),
 )
 
 _DEPTHS = "levels + 2"
@@ -193,6 +157,9 @@ TICK = RecordTable(
     _reported("limit_h", ("limits",), "how much each joint limit takes part"),
     _reported("distance", ("distances",), "of two bodies that are kept apart", "m"),
     _reported("distance_taken", ("distances",), "what each takes from how it shrinks", "m/s²"),
+    _reported("contact_force", ("contacts", 6), "planned, in the contact's axes", "N, N·m"),
+    _reported("contact_axes", ("contacts", 9), "its axes in the world, by rows"),
+    _reported("contact_use", ("contacts",), "part of its cone that the force uses"),
     _reported("scale", (_DEPTHS,), "part of its torque that each level got"),
     _terms("wanted", ("rows",), "f*, the commanded acceleration", "m/s², rad/s²"),
     _work("Jw", ("rows + limits", "n"), "whitened rows Ĵ = W J U⁻ᵀ"),
@@ -237,6 +204,7 @@ TICK = RecordTable(
     _record("dynamics", of=DYNAMICS),
     _record("bounds", of=BOUNDS),
     _record("distances", of=DISTANCES),
+    _record("stance", of=STANCE),
 )
 
 
@@ -277,6 +245,7 @@ TABLES = (
     INERTIA,
     BOUNDS,
     DISTANCES,
+    STANCE,
     RIGID_BODIES,
     DYNAMICS,
     STATES,

@@ -264,6 +264,21 @@ class AdapterBase(ABC):
         self._q_memory[:] = q  # pyright: ignore[reportArgumentType, reportCallIssue]
         self._v_memory[:] = v  # pyright: ignore[reportArgumentType, reportCallIssue]
 
+    def place_turned(self, q: ArrayLike, v: ArrayLike) -> None:
+        """Set a state as `place` does, of a robot with quaternions, which are normalised.
+
+        Raises:
+            TypeError: Something else than such an array.
+            ValueError: An array of another shape.
+            InputError: A quaternion of length zero, or numbers that are not finite.
+        """
+        self.place(q, v)
+        for i in self.description.quaternions:
+            length = math.sqrt(sum([x * x for x in self._q_memory[i : i + 4]]))
+            if not 1e-6 <= length < math.inf:
+                self.check_state(self._q, self._v)
+            self._q[i : i + 4] /= length
+
     def catch_up(self) -> None:
         """Run the dynamics at the state of the last `place`, unless that has been done."""
         if self._behind:

@@ -395,6 +395,11 @@ class Stack:
         """Move contacts on to time ``t`` [s] and return those there are, as `begin_tick` does."""
         return self._contacts.begin_tick(t)
 
+    @property
+    def touching(self) -> tuple[ContactMember, ...]:
+        """The contacts of the last `begin_contacts`."""
+        return self._contacts.present
+
     def hinder(self, hindrance: float) -> None:
         """Tell the contacts that are to go what the last tick gave up, see `ContactMember.advance`."""
         self._contacts.hinder(hindrance)
