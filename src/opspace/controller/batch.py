@@ -14,6 +14,7 @@ from opspace.errors import InputError
 from opspace.kernels.columns import OWN, REMEMBERS, TURN
 from opspace.machine.field_table import Record
 from opspace.plan.entries import KERNELS
+from opspace.plan.pack_contacts import fits
 from opspace.plan.pack_task import kind_of
 from opspace.plan.plan import Plan
 from opspace.plan.records import REMEMBERED, STATES
@@ -21,7 +22,7 @@ from opspace.robots.adapter import AdapterBase
 from opspace.robots.bodies import make_dynamics
 from opspace.robots.motion_axes import MotionAxes
 from opspace.robots.rigid_model import RigidModel
-from opspace.stack import Member
+from opspace.stack import ContactMember, Member
 from opspace.tasks.activations import own_activation
 from opspace.tasks.tracking import TrackingTask
 
@@ -60,12 +61,21 @@ class Batch:
         self.members = members
         self.threads = threads
         self.robot = robot
-        self._plans = [planned(members, _axes(model)) for _ in range(threads)]
+        self._plans = [planned(members, _axes(model, robot.nq)) for _ in range(threads)]
 
     @property
     def plan(self) -> Plan:
         """What one of the threads works with."""
         return self._plans[0]
+
+    def touch(self, members: tuple[ContactMember, ...], t: float) -> bool:
+        """Take over the contacts at time ``t`` [s], and tell whether there is room for them."""
+        for plan in self._plans:
+            if plan.contacts is not None:
+                if len(members) > plan.contacts.most:
+                    return False
+                plan.contacts.begin(members, self.robot, t)
+        return True
 
     def disturb(self, acceleration: np.ndarray) -> None:
         """Tell the joint limits what comes on top of the commanded accelerations, (n,) rad/s²."""
@@ -143,9 +153,28 @@ class Batch:
         return own
 
 
-def _axes(model: RigidModel) -> MotionAxes:
+def _axes(model: RigidModel, nq: int) -> MotionAxes:
     n = model.bodies.before.size
-    return model.motion_axes(make_dynamics(model.bodies), np.zeros(n), np.zeros(n))
+    return model.motion_axes(make_dynamics(model.bodies), np.zeros(nq), np.zeros(n))
+
+
+def check_contacts(members: tuple[ContactMember, ...]) -> None:
+    """Check that compiled code can evaluate the contacts in any state.
+
+    Raises:
+        InputError: A contact is the user's own, or has an activation of its own.
+    """
+    for member in members:
+        contact = member.contact
+        if contact.activation is not None:
+            raise InputError(
+                f"contact {contact.name!r} has an activation of its own, which a batch does not call"
+            )
+        if not fits((member,)):
+            raise InputError(
+                f"contact {contact.name!r} ({type(contact).__name__}) is evaluated in Python, one "
+                "state at a time; a batch takes the contacts of the library only"
+            )
 
 
 def cores() -> int:

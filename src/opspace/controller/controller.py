@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from opspace.command import Command, Status
-from opspace.controller.batch import Batch, check_members, checked_states, cores
+from opspace.controller.batch import Batch, check_contacts, check_members, checked_states, cores
 from opspace.controller.disturbance import DisturbanceObserver
 from opspace.controller.reference import ReferenceController
 from opspace.controller.stages import sum_of_hard_torques
@@ -210,7 +210,8 @@ class Controller(ReferenceController):
         its tasks. It computes the dynamics itself and uses every core.
 
         Activations of the user's own (`Task.activation`) are called in Python, once per state;
-        references in time once per call. Call it from the thread that ticks.
+        references in time once per call. Contacts of a floating base have come as far as at the last
+        tick. Call it from the thread that ticks.
 
         Args:
             Q: (states, nq) configurations.
@@ -221,11 +222,11 @@ class Controller(ReferenceController):
         Returns:
             (states, n) torques, N·m, bias included as far as `step` includes it; always finite. In a
             state where the model gives nothing usable it is the braking torque that `step` gives with
-            ``Status.FAULT``.
+            ``Status.FAULT`` where no tick was before.
 
         Raises:
-            InputError: A wrong shape or a number that is not finite, with its row; a task that is
-                evaluated in Python, or that holds what it will find at its first tick; a
+            InputError: A wrong shape or a number that is not finite, with its row; a task or contact
+                that is evaluated in Python, or a task that holds what it will find at its first tick; a
                 robot of the user's own.
         """
         if t is None:
@@ -238,9 +239,16 @@ class Controller(ReferenceController):
         check_members(members)
         batch = self._batch
         threads = threads or cores()
+        touching = self.stack.touching
+        check_contacts(touching)
         same = batch is not None and batch.members is members and batch.threads == threads
-        if batch is None or not same or not self._watches_all(batch.plan):
+        if (
+            batch is None
+            or not (same and self._sees_all(batch.plan))
+            or not batch.touch(touching, t)
+        ):
             batch = self._batch = self._batched(members, threads)
+            batch.touch(touching, t)
         if self._observer is not None:
             batch.disturb(self._observer.acceleration)
         states = checked_states(batch.robot, Q, V)
@@ -310,7 +318,7 @@ class Controller(ReferenceController):
                 f"robot {robot.name!r} is not one of load_robot with hinges and slides; a batch "
                 "needs its bodies"
             )
-        return Batch(robot, self._bodies, members, self._planned, threads)
+        return Batch(robot, self._bodies, members, self._planned_apart, threads)
 
     def _lay_out_ahead(self, to_come: Iterator[Outlook]) -> None:
         """Make the plans that will be needed, so that a tick has only to take one up."""
@@ -410,6 +418,16 @@ class Controller(ReferenceController):
         return PackedContacts(axes, max(known, ROOM_FOR), room)
 
     def _planned(self, members: tuple[Member, ...], axes: MotionAxes) -> Plan:
+        return self._plan_of(members, axes, self._standing)
+
+    def _planned_apart(self, members: tuple[Member, ...], axes: MotionAxes) -> Plan:
+        """Make a plan with contacts of its own, as every thread of a batch needs one."""
+        own = self._contacts_of(axes, len(self.stack.contacts)) if self._base else None
+        return self._plan_of(members, axes, own)
+
+    def _plan_of(
+        self, members: tuple[Member, ...], axes: MotionAxes, contacts: PackedContacts | None
+    ) -> Plan:
         return Plan(
             members,
             axes,
@@ -419,13 +437,15 @@ class Controller(ReferenceController):
             self._options(),
             self._blending,
             self._collisions,
-            self._standing,
+            contacts,
         )
 
     def _watches_all(self, plan: Plan) -> bool:
         """Tell whether a plan knows of all obstacles that there are now, and has room for contacts."""
-        if plan.contacts is not self._standing:
-            return False
+        return plan.contacts is self._standing and self._sees_all(plan)
+
+    def _sees_all(self, plan: Plan) -> bool:
+        """Tell whether a plan knows of all obstacles that there are now."""
         if self._collisions is None or plan.distances is None:
             return True
         return plan.distances.layout is self._collisions.layout()

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 
+from opspace.kernels.active_set import clean_again
 from opspace.kernels.algebra import (
     apply_reflectors,
     apply_reflectors_transposed,
@@ -27,7 +28,7 @@ from opspace.kernels.contact_columns import (
 )
 from opspace.kernels.contact_rows import close_contacts
 from opspace.kernels.inertia import acceleration_of, torque_of
-from opspace.kernels.projection import clean, task_metric
+from opspace.kernels.projection import task_metric
 from opspace.law.scalars import (
     HARD,
     LEAST_REGULAR,
@@ -63,7 +64,7 @@ def nearest_with_forces(work, stacks, closings):
     z = stance.bounds.z
     for b in range(size - rank):
         z[b] = 0.0
-    clean(count, size - rank, stance.bounds)
+    clean_again(count, size - rank, stance)
     _go(work, free, size, rank)
 
 

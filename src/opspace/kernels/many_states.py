@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from opspace.kernels.columns import DAMPING, REMEMBERS, TURN
+from opspace.kernels.columns import BASE, DAMPING, REMEMBERS, TURN
 from opspace.kernels.tick import tick
 from opspace.machine.jit import jit
 
@@ -44,6 +44,7 @@ def begin_state(work, before, own):
     """Go back to what the tick before knew."""
     for i in range(before.group.shape[0]):
         work.group[i] = before.group[i]
+    work.stance.remembered[0] = 0
     for i in range(before.remembers.shape[0]):
         work.own[i] = own[i]
         work.kind[i, REMEMBERS] = before.remembers[i]
@@ -55,6 +56,9 @@ def begin_state(work, before, own):
 def brake(work, tau):
     """Bias with joint damping (n,), N·m, inside the motors' limits; finite whatever the model says."""
     for a in range(tau.shape[0]):
+        if a < work.option[BASE]:
+            tau[a] = 0.0
+            continue
         x = work.bias[a] - work.option[DAMPING] * work.M[a, a] * work.v[a]
         limit = min(work.torque_limit[a], LARGEST)
         tau[a] = 0.0 if math.isnan(x) else min(max(x, -limit), limit)

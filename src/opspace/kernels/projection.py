@@ -69,7 +69,7 @@ def nearest_acceleration(inertia, acceleration, bounds, distances):
         distances.held[i] = 0
     count = _take_in(inertia, acceleration, count, n, bounds, distances)
     while True:
-        clean(count, n, bounds)
+        _clean(count, n, bounds)
         for a in range(n):
             acceleration[a] = bounds.y[a]
         solve_lower_transposed(bounds.C, n, acceleration)
@@ -81,7 +81,7 @@ def nearest_acceleration(inertia, acceleration, bounds, distances):
 
 
 @jit
-def clean(count, n, bounds):
+def _clean(count, n, bounds):
     """Project z several times, what softness leaves of an excess included."""
     for a in range(n):
         bounds.x[a] = bounds.z[a]
@@ -171,8 +171,8 @@ def _project(count, n, bounds):
         bounds.active[size] = worst
         known, size = size, size + 1
         while size > 0:
-            _multipliers(n, known, size, bounds)
-            if _advance(size, bounds):
+            multipliers(n, known, size, bounds)
+            if advance(size, bounds):
                 break
             known, size = 0, _drop(size, bounds)
         for a in range(n):
@@ -203,7 +203,7 @@ def _most_broken(count, n, size, bounds):
 
 
 @jit
-def _multipliers(n, known, size, bounds):
+def multipliers(n, known, size, bounds):
     """Solve (N Nᵀ + softness) λ = N x − bound for the bounds that hold, of which some are factored."""
     for k in range(size):
         i = bounds.active[k]
@@ -227,7 +227,7 @@ def _multipliers(n, known, size, bounds):
 
 
 @jit
-def _advance(size, bounds):
+def advance(size, bounds):
     """Move the multipliers towards what is wanted until one of them is zero.
 
     Returns:

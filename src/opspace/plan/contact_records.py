@@ -21,7 +21,9 @@ _INT = np.int64
 _plan = partial(Field, writer="plan", lives="plan")
 _refresh = partial(Field, writer="refresh", lives="tick")
 _after = partial(Field, lives="tick")
+_kept = partial(Field, lives="kept")
 _EACH = f"{SOLE_ROWS} contacts"
+_BOUNDS = f"4 n + {4 * SOLE_ROWS + EACH} contacts"
 _ALL = f"n + {SOLE_ROWS} contacts"
 
 STANCE = RecordTable(
@@ -74,6 +76,11 @@ STANCE = RecordTable(
     Field("sigma", (BASE_SIZE,), "singular values"),
     Field("start", (BASE_SIZE,), "shortest change that gives the base what it lacks"),
     Field("row", (_ALL,), "any row of coordinates"),
+    _kept("remembered", (1,), "bounds that held at the tick before", dtype=_INT),
+    _kept("held", (_BOUNDS,), "which they were", dtype=_INT),
+    _kept("pressed", (_BOUNDS,), "their multipliers", "√J/s"),
+    Field("place_of", (_BOUNDS,), "where each of them is among those of now", dtype=_INT),
+    Field("tolerance", (_BOUNDS,), "excess that is rounding", "√J/s"),
     Field("bounds", (), "", lives="plan", of=BOUNDS),
 )
 

@@ -1,0 +1,215 @@
+"""A robot that stands: the compiled tick against the readable one."""
+
+import pickle
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import opspace as osc
+from opspace.controller.reference import ReferenceController
+from opspace.errors import InputError
+
+HALF, OFFSET = (0.085, 0.025), (0.035, 0.0, -0.035)
+DT = 0.01
+SOFT_ACCURACY = 1e-4
+"""Where limits contradict each other, their softness makes the equations that badly conditioned."""
+
+
+def humanoid(ankle, half, offset, hand):
+    """Two soles that stand, and a hand that may come, with what such a robot does."""
+
+    def make():
+        contacts = [
+            osc.SoleContact(ankle.format(side), half, offset=offset, name=side)
+            for side in ("left", "right")
+        ]
+        wall = osc.PointContact(hand, normal=(-1.0, 0.0, 0.2), force=20.0, name="wall")
+        tasks = [
+            osc.ComTask(kp=50.0),
+            [osc.PositionTask(hand, name="hand"), osc.AngularMomentumTask()],
+            osc.PostureTask(kp=25.0),
+        ]
+        return tasks, contacts, wall
+
+    return make
+
+
+def quadruped():
+    """Four points that stand, one of which comes and goes."""
+    feet = [osc.PointContact(f, friction=0.8) for f in ("FL_FOOT", "FR_FOOT", "HL_FOOT", "HR_FOOT")]
+    tasks = [osc.ComTask(), osc.OrientationTask("base_link", name="trunk"), osc.PostureTask()]
+    return tasks, feet[1:], feet[0]
+
+
+ROBOTS = {
+    "g1": humanoid("{}_ankle_roll_link", HALF, OFFSET, "right_rubber_hand"),
+    "talos": humanoid("{}_sole_link", (0.1, 0.06), (0.0, 0.0, 0.0), "wrist_left_ft_tool_link"),
+    "solo12": quadruped,
+}
+
+
+class Twins:
+    """The same robot on the same contacts twice, run by either form."""
+
+    def __init__(self, name, limits=True, backend="pinocchio", **options):
+        self.controllers, self.others = [], []
+        for kind in (osc.Controller, ReferenceController):
+            tasks, contacts, other = ROBOTS[name]()
+            stack = osc.Stack(tasks, osc.JointLimits() if limits else None, contacts)
+            robot = osc.load_robot(name, backend=backend)
+            self.controllers.append(kind(robot, stack, **options))
+            self.others.append(other)
+        self.robot = self.controllers[0].robot
+        self.stacks = [c.stack for c in self.controllers]
+
+    def step(self, t, q, v):
+        ours, readable = (c.step(t, q, v) for c in self.controllers)
+        lost = osc.Status.LIMIT_LOST in readable.status
+        near = (SOFT_ACCURACY if lost else 1e-8) * (1.0 + np.max(np.abs(readable.tau)))
+        assert ours.status == readable.status
+        assert np.max(np.abs(ours.tau - readable.tau)) <= near
+        assert np.all(ours.tau[:6] == 0.0)
+        assert ours.hard_solves == readable.hard_solves
+        assert ours.limits.keys() == readable.limits.keys()
+        assert list(ours.contacts) == list(readable.contacts)
+        for name, told in readable.contacts.items():
+            own, weight = ours.contacts[name], 1.0 + np.max(np.abs(readable.tau))
+            assert abs(own.progress - told.progress) < 1e-7
+            assert abs(own.motion - told.motion) < 1e-6
+            assert abs(own.activation - told.activation) < 1e-6
+            assert own.waiting == told.waiting
+            for what in ("force", "moment"):
+                moved = np.max(np.abs(getattr(own, what) - getattr(told, what)))
+                assert moved <= 10.0 * near + 1e-6 * weight * (own.progress != told.progress)
+            if told.force @ told.force > 1e-2:
+                assert np.max(np.abs(own.cop - told.cop)) < 1e-5
+                assert abs(own.cone_use - told.cone_use) < 1e-5
+        for name, task in readable.tasks.items():
+            assert np.allclose(ours.tasks[name].error, task.error, rtol=0.0, atol=1e-10)
+        return ours
+
+
+def state(robot, rng, bend=0.1, speed=0.3):
+    q = robot.integrate(robot.q_reference, rng.normal(0.0, bend, robot.nv), 1.0)
+    return q, rng.normal(0.0, speed, robot.nv)
+
+
+requests = st.lists(
+    st.tuples(
+        st.sampled_from(["insert", "remove", "force out", "out", "swap", "wanted", "friction"]),
+        st.sampled_from([0.0, 0.02, 0.05]),
+        st.integers(1, 3),
+    ),
+    min_size=1,
+    max_size=4,
+)
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+@given(asked=requests, seed=st.integers(0, 1000), speed=st.sampled_from([0.0, 0.2, 1.0]))
+@settings(max_examples=3, deadline=None)
+def test_both_forms_agree_whatever_is_asked(name, asked, seed, speed):
+    rng = np.random.default_rng(seed)
+    twins = Twins(name, torque_limits="priority")
+    tick = 0
+    q, v = state(twins.robot, rng, 0.1, speed)
+    twins.step(0.0, q, v)
+    for what, duration, ticks in asked:
+        for stack, other in zip(twins.stacks, twins.others, strict=True):
+            first = next(iter(stack.contacts))
+            if what == "insert":
+                stack.insert(other, duration)
+            elif what == "remove":
+                stack.remove(first, duration)
+            elif what == "force out":
+                stack.remove(first, duration, wait=False)
+            elif what == "out" and other.name in stack.contacts:
+                stack.remove(other, duration)
+            elif what == "swap":
+                stack.swap("com", "posture", duration)
+            elif what == "wanted":
+                other.force = 12.0
+            elif what == "friction":
+                stack.contacts[first].friction = 0.3
+            if not stack.contacts:
+                return
+        for _ in range(ticks):
+            tick += 1
+            twins.step(tick * DT, *state(twins.robot, rng, 0.1, speed))
+
+
+@pytest.mark.parametrize("name", ["g1", "solo12"])
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"singularity": osc.Singularity(), "limits": False},
+        {"backend": "mujoco", "blending": "chain"},
+    ],
+    ids=["buffer", "mujoco"],
+)
+def test_both_forms_agree_with_other_options(name, options):
+    twins, rng = Twins(name, **options), np.random.default_rng(3)
+    for stack, other in zip(twins.stacks, twins.others, strict=True):
+        stack.insert(other, 0.04)
+    for i in range(4):
+        twins.step(i * DT, *state(twins.robot, rng))
+
+
+def test_in_the_air_and_with_one_point_both_forms_agree():
+    """Forces cannot give every wrench: the rank of the equations falls."""
+    twins, rng = Twins("solo12"), np.random.default_rng(5)
+    for i, left in enumerate([3, 2, 1, 0]):
+        for stack in twins.stacks:
+            for name in list(stack.contacts)[left:]:
+                stack.remove(name, 0.0, wait=False)
+        twins.step(i * DT, *state(twins.robot, rng))
+
+
+def test_a_posture_that_names_the_base_and_a_long_quaternion_are_the_same_in_both_forms():
+    twins, rng = Twins("g1"), np.random.default_rng(2)
+    for stack in twins.stacks:
+        stack.insert(osc.PostureTask(joints=["floating_base"], name="base"), 0.5, 0.0)
+    q, v = state(twins.robot, rng)
+    once = twins.step(0.0, q, v).tau
+    q[3:7] *= 3.0
+    assert np.max(np.abs(twins.step(DT, q, v).tau - once)) < 1e-9
+    assert abs(np.linalg.norm(twins.robot.q[3:7]) - 1.0) < 1e-15
+    for wrong, what in ((0.0, "length zero"), (np.nan, "is nan")):
+        q[3:7] = wrong
+        with pytest.raises(InputError, match=what):
+            twins.controllers[0].step(2 * DT, q, v)
+
+
+class Cautious(osc.SoleContact):
+    """A contact of one's own, with half the friction."""
+
+    def cone(self):
+        found = super().cone()
+        found[:4, 2] *= 0.5
+        return found
+
+
+def test_contacts_of_ones_own_take_the_readable_form_and_more_than_there_is_room_for_get_it():
+    twins, rng = Twins("g1"), np.random.default_rng(4)
+    many = [f"left_{part}_link" for part in ("elbow", "wrist_roll", "wrist_pitch", "wrist_yaw")]
+    twins.step(0.0, *state(twins.robot, rng))
+    for stack in twins.stacks:
+        stack.insert(Cautious("left_rubber_hand", HALF, name="own"), 0.0)
+    twins.step(DT, *state(twins.robot, rng))
+    assert twins.controllers[0]._laid_out is None
+    for stack in twins.stacks:
+        stack.remove("own", 0.0)
+        for frame in [*many, "pelvis", "torso_link"]:
+            stack.insert(osc.PointContact(frame), 0.03)
+    for i in range(3):
+        twins.step((2 + i) * DT, *state(twins.robot, rng))
+    assert twins.controllers[0]._laid_out is not None
+
+
+def test_what_a_command_tells_of_contacts_can_be_copied():
+    command = Twins("g1").step(0.0, *state(osc.load_robot("g1"), np.random.default_rng(0)))
+    told = pickle.loads(pickle.dumps(command)).contacts
+    assert list(told) == ["left", "right"]
+    assert np.array_equal(told["left"].force, command.contacts["left"].force)
