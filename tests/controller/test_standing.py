@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 import opspace as osc
-from opspace.controller.reference import ReferenceController
 from opspace.errors import InputError
 
 HALF, OFFSET = (0.085, 0.025), (0.035, 0.0, -0.035)
@@ -98,14 +97,6 @@ def test_both_libraries_give_the_same_torque_and_forces(g1, seed):
     for side in FEET:
         a, b = (command.contacts[side].force for command in commands)
         assert np.max(np.abs(a - b)) < 1e-6 * size
-
-
-def test_the_compiled_controller_computes_what_the_readable_one_does(g1):
-    q, v = states(g1, 7)
-    stack = controller_of(g1).stack
-    readable = ReferenceController(g1, stack).step(0.0, q, v)
-    compiled = osc.Controller(g1, stack).step(0.0, q, v)
-    assert np.array_equal(readable.tau, compiled.tau)
 
 
 def test_in_the_air_the_centre_of_mass_falls(g1):
@@ -217,9 +208,3 @@ def test_what_makes_no_sense_is_refused(g1):
             controller_of(g1, **option)
     with pytest.raises(osc.UnknownNameError, match="sole"):
         controller_of(g1, contacts=[osc.SoleContact("sole", HALF)])
-    controller = controller_of(g1)
-    controller.step(0.0, g1.q_reference, np.zeros(g1.nv))
-    with pytest.raises(
-        InputError, match="a batch cannot call the readable tick of a floating base"
-    ):
-        controller.torque_batch(g1.q_reference[None], np.zeros((1, g1.nv)))
