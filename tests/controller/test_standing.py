@@ -4,11 +4,15 @@ import numpy as np
 import pytest
 
 import opspace as osc
+from opspace.controller.reference import ReferenceController
 from opspace.errors import InputError
 
 HALF, OFFSET = (0.085, 0.025), (0.035, 0.0, -0.035)
 FEET = ("left", "right")
 WEIGHT = 33.34114202 * 9.81
+FORM = [osc.Controller]
+"""What runs the stack in a test that both forms have to pass."""
+both_forms = pytest.mark.usefixtures("_form")
 
 
 @pytest.fixture(scope="module")
@@ -30,7 +34,14 @@ def controller_of(robot, *, contacts=None, limits=None, **options):
         osc.PostureTask(kp=25.0),
     ]
     stack = osc.Stack(tasks, limits, soles() if contacts is None else contacts)
-    return osc.Controller(robot, stack, **options)
+    return FORM[0](robot, stack, **options)
+
+
+@pytest.fixture(params=[osc.Controller, ReferenceController], ids=["compiled", "readable"])
+def _form(request):
+    FORM[0] = request.param
+    yield
+    FORM[0] = osc.Controller
 
 
 def states(robot, seed, speed=0.3):
@@ -52,6 +63,7 @@ def plant(robot, tau, contacts):
     return x[: robot.nv], [t.axes @ f[:3] for t, f in zip(terms, own, strict=True)]
 
 
+@both_forms
 @pytest.mark.parametrize("seed", range(3))
 def test_a_rigid_plant_answers_with_the_forces_that_were_planned(g1, seed):
     q, v = states(g1, seed)
@@ -71,6 +83,7 @@ def test_a_rigid_plant_answers_with_the_forces_that_were_planned(g1, seed):
         assert np.max(np.abs(terms.J @ moved - asked)) < 1e-7 * (1.0 + np.max(np.abs(asked)))
 
 
+@both_forms
 def test_at_rest_the_feet_carry_the_weight_and_nothing_is_given_up(g1):
     command = controller_of(g1).step(0.0, g1.q_reference, np.zeros(g1.nv))
     assert command.status == osc.Status.OK
@@ -99,6 +112,7 @@ def test_both_libraries_give_the_same_torque_and_forces(g1, seed):
         assert np.max(np.abs(a - b)) < 1e-6 * size
 
 
+@both_forms
 def test_in_the_air_the_centre_of_mass_falls(g1):
     q, v = states(g1, 1)
     controller = controller_of(g1, contacts=[])
@@ -112,6 +126,7 @@ def test_in_the_air_the_centre_of_mass_falls(g1):
     assert np.all(np.isfinite(command.tau))
 
 
+@both_forms
 def test_motors_and_joints_keep_their_limits_on_the_ground(g1):
     limited = 0
     controller = controller_of(g1, limits=osc.JointLimits(), torque_limits="priority")
@@ -124,6 +139,7 @@ def test_motors_and_joints_keep_their_limits_on_the_ground(g1):
     assert limited
 
 
+@both_forms
 def test_a_contact_leaves_without_a_step_and_waits_while_it_is_needed(g1):
     """The state stands still, so every change is that of the contact."""
     controller = controller_of(g1, limits=osc.JointLimits())
@@ -147,6 +163,7 @@ def test_a_contact_leaves_without_a_step_and_waits_while_it_is_needed(g1):
     assert np.max(np.abs(command.tau - tau[0])) < 1e-6
 
 
+@both_forms
 def test_a_wanted_force_is_given_by_a_hand_and_taken_by_the_feet(g1):
     hand = osc.PointContact("right_rubber_hand", normal=(-1.0, 0.0, 0.0), force=20.0, name="hand")
     controller = controller_of(g1, contacts=[*soles(), hand])
@@ -160,11 +177,12 @@ def test_a_wanted_force_is_given_by_a_hand_and_taken_by_the_feet(g1):
     assert np.all(command.contacts["hand"].moment == 0.0)
 
 
+@both_forms
 def test_a_quadruped_stands_on_points_and_its_momentum_decays_as_asked():
     robot = osc.load_robot("solo12")
     feet = [osc.PointContact(f, friction=0.8) for f in ("FL_FOOT", "FR_FOOT", "HL_FOOT", "HR_FOOT")]
     tasks = [osc.AngularMomentumTask(kv=5.0), osc.ComTask(), osc.PostureTask()]
-    controller = osc.Controller(robot, osc.Stack(tasks, contacts=feet))
+    controller = FORM[0](robot, osc.Stack(tasks, contacts=feet))
     speed = 0.05 * np.random.default_rng(0).normal(size=robot.nv)
     command = controller.step(0.0, robot.q_reference, speed)
     assert command.status == osc.Status.OK
@@ -176,6 +194,7 @@ def test_a_quadruped_stands_on_points_and_its_momentum_decays_as_asked():
     assert np.max(np.abs(terms.acceleration)) > 1e-4
 
 
+@both_forms
 def test_a_contact_has_an_activation_of_its_own(g1):
     controller = controller_of(g1)
     controller.stack.contacts["right"].activation = lambda _robot, t: 0.65 if t < 1.0 else 2.0
@@ -186,6 +205,7 @@ def test_a_contact_has_an_activation_of_its_own(g1):
         controller.step(1.5, g1.q_reference, np.zeros(g1.nv))
 
 
+@both_forms
 def test_a_tick_that_cannot_be_trusted_holds_the_last_torque(g1):
     controller = controller_of(g1, period=1e-3, on_time_jump="hold")
     q, still = g1.q_reference, np.zeros(g1.nv)

@@ -8,6 +8,7 @@ from types import MappingProxyType
 
 import numpy as np
 
+from opspace.contacts import SoleContact
 from opspace.controller import Controller, ReferenceController
 from opspace.errors import missing_extra
 from opspace.plan.scales import DEFAULT_SINGULARITY, Singularity
@@ -17,6 +18,7 @@ from opspace.robots.loading import read_robot
 from opspace.robots.protocol import Robot
 from opspace.stack import Stack
 from opspace.tasks import (
+    ComTask,
     JointLimits,
     JointTask,
     OrientationTask,
@@ -48,6 +50,9 @@ class Scene:
         transitions: How many tasks are on their way in all the time.
         blending: How they are blended.
         peers: Whether other controllers are asked for the same.
+        contacts: Gives what a robot with a floating base stands on.
+        torque_limits: Whether motors' limits are kept, see `opspace.Controller`.
+        sway: How far every joint goes from home, rad.
     """
 
     title: str
@@ -59,13 +64,23 @@ class Scene:
     transitions: int = 0
     blending: str = "auto"
     peers: bool = True
+    contacts: Callable[[], list[SoleContact]] = list
+    torque_limits: str = "report"
+    sway: float = 0.05
 
     def controller(self, kind: type[ReferenceController] = Controller) -> ReferenceController:
         """Build the library's controller, with its transitions begun."""
         robot = self.robot()
         levels = [list(level) for level in self.levels()]
-        stack = Stack(levels, limits=JointLimits() if self.limits else None)
-        found = kind(robot, stack, singularity=self.singularity, blending=self.blending)
+        limits = JointLimits() if self.limits else None
+        stack = Stack(levels, limits=limits, contacts=self.contacts())
+        found = kind(
+            robot,
+            stack,
+            singularity=self.singularity,
+            blending=self.blending,
+            torque_limits=self.torque_limits,
+        )
         moving = [task for level in levels for task in level][: self.transitions]
         if moving:
             q, v = self.states(robot)
@@ -86,7 +101,10 @@ class Scene:
         rng = np.random.default_rng(0)
         phase = rng.uniform(0.0, 2.0 * np.pi, robot.nv)
         angle = 2.0 * np.pi * np.arange(STATES)[:, None] / STATES + phase
-        return home + 0.05 * np.sin(angle), 0.1 * np.cos(angle)
+        way, speed = self.sway * np.sin(angle), 2.0 * self.sway * np.cos(angle)
+        if robot.nq == robot.nv:
+            return home + way, speed
+        return np.array([robot.integrate(home, step, 1.0) for step in way]), speed
 
 
 def _humanoid() -> Robot:
@@ -106,6 +124,32 @@ def _humanoid_levels() -> list[Level]:
         (PositionTask("leg_left_6_link", name="left foot"),),
         (PostureTask(),),
     ]
+
+
+HANDS = ("wrist_right_ft_tool_link", "wrist_left_ft_tool_link")
+SOLE = (0.1, 0.06)
+"""Half the sides of the soles of Talos, m."""
+
+
+def _standing_levels() -> list[Level]:
+    return [
+        (ComTask(kp=50.0),),
+        tuple(PositionTask(hand, name=hand) for hand in HANDS),
+        (PostureTask(kp=25.0),),
+    ]
+
+
+def _standing(sway: float, what: str) -> Scene:
+    return Scene(
+        f"Talos on two soles (36 coordinates), centre of mass, two hands, posture, {what}",
+        lambda: load_robot("talos"),
+        _standing_levels,
+        contacts=lambda: [
+            SoleContact(f"{side}_sole_link", SOLE, name=side) for side in ("left", "right")
+        ],
+        torque_limits="priority",
+        sway=sway,
+    )
 
 
 def _chain(k: int, blending: str) -> Scene:
@@ -173,6 +217,8 @@ SCENES: Mapping[str, Scene] = MappingProxyType(
             _humanoid,
             _humanoid_levels,
         ),
+        "standing": _standing(0.002, "no limit acts"),
+        "pushed": _standing(0.2, "cones, joints and motors act"),
         **{f"chain-{k}": _chain(k, "chain") for k in (0, 1, 2, 4, 8)},
         **{f"idv-{k}": _chain(k, "idv") for k in (1, 2, 3)},
     }

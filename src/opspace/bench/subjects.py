@@ -12,8 +12,9 @@ from opspace.bench.scenes import Scene
 from opspace.controller import ReferenceController
 from opspace.plan.entries import KERNELS
 from opspace.robots.adapter import AdapterBase, held_joints
-from opspace.robots.protocol import Robot
-from opspace.tasks import OrientationTask, PoseTask, PositionTask, PostureTask
+from opspace.robots.protocol import BASE, Robot
+from opspace.tasks import ComTask, OrientationTask, PoseTask, PositionTask, PostureTask
+from opspace.tasks.rotation import matrix_from_quaternion
 
 Tick = Callable[[np.ndarray, np.ndarray], object]
 
@@ -61,7 +62,8 @@ def placo_tick(scene: Scene) -> Tick:
     """Put the nearest equivalent of a scene to placo's dynamics solver.
 
     Tasks above the last level are hard constraints as long as they fit the joints, everything else is
-    soft; limits of joints and torques are off, as they are inequalities there.
+    soft; limits of joints and torques are off, as they are inequalities there. A robot that stands has
+    both on and its soles as hard constraints with their cones, all its tasks are soft.
     """
     import placo  # noqa: PLC0415 - an optional peer  # pyright: ignore[reportMissingImports]
 
@@ -76,22 +78,40 @@ def placo_tick(scene: Scene) -> Tick:
         "", int(placo.Flags.ignore_collisions), to_xml(urdf, inertias=True)
     )
     solver = placo.DynamicsSolver(wrapper)
-    solver.mask_fbase(True)
+    solver.mask_fbase(not robot.floating_base)
     solver.dt = 1e-3
     q, v = scene.states(robot)
     robot.update(q[0], v[0])
     levels = scene.levels()
+    contacts = scene.contacts()
+    for contact in contacts:
+        contact.bind(robot)
+        foot = _placed(robot, contact.frame_id)
+        held = solver.add_frame_task(contact.frame, foot)
+        held.configure(contact.name, "hard", 1.0, 1.0)
+        sole = solver.add_planar_contact(held)
+        sole.length, sole.width = (2.0 * side for side in contact.half)
+        sole.mu = contact.friction
+        sole.weight_forces = sole.weight_moments = 1e-3  # or the feet pull at each other
+    if contacts:
+        _keep_limits(solver, robot, wrapper)
     rows = 0
     for number, level in enumerate(levels):
         for task in level:
             task.bind(robot)
             rows += task.rows
-            hard = number < len(levels) - 1 and rows <= robot.nv
+            hard = number < len(levels) - 1 and rows <= robot.nv and not contacts
             _add(solver, robot, wrapper, task, "hard" if hard else "soft")
     state, rate = wrapper.state.q.copy(), wrapper.state.qd.copy()
 
     def tick(q: np.ndarray, v: np.ndarray) -> object:
-        state[7:], rate[6:] = q, v
+        if robot.floating_base:
+            w, x, y, z = q[3:7]
+            state[:7], state[7:] = (*q[:3], x, y, z, w), q[7:]
+            rate[:] = v
+            rate[:3] = matrix_from_quaternion((w, x, y, z)).T @ v[:3]
+        else:
+            state[7:], rate[6:] = q, v
         wrapper.state.q, wrapper.state.qd = state, rate
         wrapper.update_kinematics()
         return solver.solve(False).tau
@@ -101,19 +121,41 @@ def placo_tick(scene: Scene) -> Tick:
 
 def _add(solver: Any, robot: Robot, wrapper: Any, task: Any, priority: str) -> None:
     if isinstance(task, PostureTask):
-        posture = dict(zip(wrapper.joint_names(), robot.q.tolist(), strict=True))
+        first = BASE + 1 if robot.floating_base else 0
+        posture = dict(zip(wrapper.joint_names(), robot.q[first:].tolist(), strict=True))
         added = solver.add_joints_task()
         added.set_joints(posture)
         added.configure(task.name, "soft", 1e-3)
+        return
+    if isinstance(task, ComTask):
+        solver.add_com_task(robot.com_position()).configure(task.name, priority, 1.0)
         return
     frame = task.source.id
     name = robot.frame_names[frame]
     R, p = robot.rotation(frame), robot.position(frame)
     if isinstance(task, PoseTask):
-        pose = np.eye(4)
-        pose[:3, :3], pose[:3, 3] = R, p
-        solver.add_frame_task(name, pose).configure(task.name, priority, 1.0, 1.0)
+        solver.add_frame_task(name, _placed(robot, frame)).configure(task.name, priority, 1.0, 1.0)
     elif isinstance(task, OrientationTask):
         solver.add_orientation_task(name, R).configure(task.name, priority, 1.0)
     elif isinstance(task, PositionTask):
         solver.add_position_task(name, p).configure(task.name, priority, 1.0)
+
+
+def _keep_limits(solver: Any, robot: Robot, wrapper: Any) -> None:
+    """Let a solver keep the limits of joints and motors."""
+    limits = robot.q_lower, robot.q_upper, robot.velocity_limit, robot.torque_limit
+    for j, name in list(enumerate(robot.joint_names))[BASE:]:
+        lower, upper, speed, torque = (float(limit[j]) for limit in limits)
+        wrapper.set_joint_limits(name, lower, upper)
+        wrapper.set_velocity_limit(name, speed)
+        wrapper.set_torque_limit(name, torque)
+    solver.enable_torque_limits(True)
+    solver.enable_joint_limits(True)
+    solver.enable_velocity_limits(True)
+
+
+def _placed(robot: Robot, frame: int) -> np.ndarray:
+    """Give where a frame is, (4, 4)."""
+    pose = np.eye(4)
+    pose[:3, :3], pose[:3, 3] = robot.rotation(frame), robot.position(frame)
+    return pose
