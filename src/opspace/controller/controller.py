@@ -89,8 +89,8 @@ class Controller(ReferenceController):
     arguments, errors and results are the same. A wheel brings it compiled; elsewhere the first
     controller compiles it, which takes about half a minute, and later ones read it from the disk.
 
-    Options are fixed when it is built. Robots with joints of several coordinates, and stacks of more
-    than some thirty tasks, take the readable form.
+    Options are fixed when it is built. Stacks of more than some thirty tasks, and contacts of one's own
+    class, take the readable form.
     """
 
     _axes: MotionAxes | None = None
