@@ -270,7 +270,7 @@ class Controller(ReferenceController):
         if self._axes is None or not isinstance(robot, AdapterBase):
             return 0.0
         seconds = KERNELS.load()
-        if self._base:
+        if self._base and self._standing is None:
             self._standing = self._contacts_of(self._axes, len(self.stack.contacts))
         self._fixed = (
             robot,

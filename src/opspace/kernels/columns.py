@@ -5,7 +5,7 @@ from __future__ import annotations
 from opspace.command import Status
 
 # Kinds of tasks.
-OWN, MOTION, JOINTS = range(3)
+OWN, MOTION, JOINTS, MOMENTUM = range(4)
 # Where motion is measured.
 WORLD, RELATIVE, CENTRE_OF_MASS = range(3)
 # What is controlled of a motion.

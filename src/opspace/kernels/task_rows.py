@@ -13,6 +13,7 @@ from opspace.kernels.columns import (
     JOINTS,
     KIND,
     MAX_SPEED,
+    MOMENTUM,
     MOTION,
     ORIENTATION,
     POSE,
@@ -30,6 +31,7 @@ from opspace.kernels.compiled_scalars import (
     speed_scale,
     without_turns,
 )
+from opspace.kernels.momentum_rows import momentum_task
 from opspace.kernels.motion import A, P, R, V, measure, move_joints
 from opspace.law.scalars import SIGNS
 from opspace.machine.jit import jit
@@ -48,6 +50,8 @@ def evaluate_tasks(work):
             _motion_task(work, i)
         elif work.kind[i, KIND] == JOINTS:
             _joint_task(work, i)
+        elif work.kind[i, KIND] == MOMENTUM:
+            momentum_task(work, i)
 
 
 @jit

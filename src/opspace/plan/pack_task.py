@@ -26,6 +26,7 @@ from opspace.kernels.columns import (
     KIND_SIZE,
     LOCAL,
     MAX_SPEED,
+    MOMENTUM,
     MOTION,
     NUMBERS_SIZE,
     OFFSET,
@@ -53,6 +54,7 @@ from opspace.robots.motion_axes import FramePlace, MotionAxes
 from opspace.stack import Member
 from opspace.tasks import TASK_KINDS, Task
 from opspace.tasks.activations import own_activation
+from opspace.tasks.angular_momentum import AngularMomentumTask
 from opspace.tasks.force import ForceTask
 from opspace.tasks.gains import Gains
 from opspace.tasks.impedance import ImpedanceTask
@@ -97,6 +99,8 @@ def kind_of(task: Task) -> int:
     It is one by exact type, or as a subclass that overrides nothing that a tick asks a task for.
     """
     kind = type(task)
+    if kind is AngularMomentumTask:
+        return MOMENTUM
     known = {one.task for one in TASK_KINDS.values()} | {MotionTask, PostureTask}
     built_in = next((base for base in kind.__mro__ if base in known), None)
     if built_in is None or _overrides(task, built_in) or type(task._gains) is not Gains:
@@ -211,14 +215,20 @@ class Packed:
             self._own_activation = False
         if self.own_kind:
             self._evaluate(robot, t)
-        elif (
+        elif self._changed:
+            self._pack(robot, t)
+        self.moving = self.own_kind or self._timed or self._own_activation or _silent(task)
+
+    @property
+    def _changed(self) -> bool:
+        """Whether something is to be packed."""
+        task = self.task
+        return (
             self._timed
             or task._target is not self.target
             or task._held is not self.held
             or task._gains is not self.gains
-        ):
-            self._pack(robot, t)
-        self.moving = self.own_kind or self._timed or self._own_activation or _silent(task)
+        )
 
     @property
     def settled(self) -> bool:
@@ -226,6 +236,12 @@ class Packed:
         task = self.task
         if self.own_kind or task.activation is not None or _silent(task):
             return False
+        return self._packed_ahead
+
+    @property
+    def _packed_ahead(self) -> bool:
+        """Whether all numbers of the task itself are there."""
+        task = self.task
         return self.target is task._target and self.held is task._held and not self._timed
 
     def remember(self, before: Packed | None) -> None:

@@ -17,6 +17,7 @@ from opspace.kernels.columns import (
     LIMIT_LAW,
     LIMIT_PROFILE,
     LIMIT_WEIGHT,
+    MOMENTUM,
     VARIABLE_SIZE,
 )
 from opspace.kernels.limit_columns import DISTURBANCE, SIGN, SPEED
@@ -27,7 +28,8 @@ from opspace.machine.record import WORD
 from opspace.plan.memory import Sizes, make_tick
 from opspace.plan.pack_contacts import PackedContacts
 from opspace.plan.pack_distances import PackedDistances
-from opspace.plan.pack_task import Packed
+from opspace.plan.pack_momentum import PackedMomentum
+from opspace.plan.pack_task import Packed, kind_of
 from opspace.plan.scales import Scales
 from opspace.robots.adapter import AdapterBase
 from opspace.robots.motion_axes import MotionAxes
@@ -261,7 +263,8 @@ class Plan:
         packed: list[Packed] = []
         first = 0
         for i, member in enumerate(self.members):
-            entry = Packed(member, i, first, self.axes, self.tick)
+            momentum = kind_of(member.task) == MOMENTUM
+            entry = (PackedMomentum if momentum else Packed)(member, i, first, self.axes, self.tick)
             self.tick.row_weight[entry.rows] = 1.0 / np.sqrt(scales.reference(member.task))
             first = entry.rows.stop
             packed.append(entry)
