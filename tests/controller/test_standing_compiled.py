@@ -53,11 +53,11 @@ ROBOTS = {
 class Twins:
     """The same robot on the same contacts twice, run by either form."""
 
-    def __init__(self, name, limits=True, backend="pinocchio", **options):
+    def __init__(self, name, limits=osc.JointLimits, backend="pinocchio", **options):
         self.controllers, self.others = [], []
         for kind in (osc.Controller, ReferenceController):
             tasks, contacts, other = ROBOTS[name]()
-            stack = osc.Stack(tasks, osc.JointLimits() if limits else None, contacts)
+            stack = osc.Stack(tasks, limits(), contacts)
             robot = osc.load_robot(name, backend=backend)
             self.controllers.append(kind(robot, stack, **options))
             self.others.append(other)
@@ -152,17 +152,27 @@ def test_both_forms_agree_whatever_is_asked(name, asked, seed, speed):
 @pytest.mark.parametrize(
     "options",
     [
-        {"singularity": osc.Singularity(), "limits": False},
+        {"singularity": osc.Singularity(), "limits": lambda: None},
         {"backend": "mujoco", "blending": "chain"},
+        {"limits": lambda: osc.JointLimits(mode="buffer")},
+        {
+            "limits": lambda: osc.JointLimits(observer_time=0.1),
+            "torque_limits": "priority",
+            "period": DT,
+        },
     ],
-    ids=["buffer", "mujoco"],
+    ids=["singular", "mujoco", "buffer", "observer"],
 )
 def test_both_forms_agree_with_other_options(name, options):
     twins, rng = Twins(name, **options), np.random.default_rng(3)
     for stack, other in zip(twins.stacks, twins.others, strict=True):
         stack.insert(other, 0.04)
     for i in range(4):
-        twins.step(i * DT, *state(twins.robot, rng))
+        q, v = state(twins.robot, rng)
+        near = rng.integers(8, twins.robot.nq, 2)
+        reachable = np.isfinite(twins.robot.q_upper[near - 1])
+        q[near[reachable]] = twins.robot.q_upper[near[reachable] - 1] - 0.02
+        twins.step(i * DT, q, v)
 
 
 def test_in_the_air_and_with_one_point_both_forms_agree():

@@ -136,8 +136,8 @@ class PackedContacts:
 
 
 def _known(contact: GroundContact) -> tuple[object, ...]:
-    """Collect what is packed of a contact; what is replaced is another object."""
-    half = contact.half if isinstance(contact, SoleContact) else None
+    """Collect what is packed of a contact."""
+    half = tuple(contact.half) if isinstance(contact, SoleContact) else None
     force = contact.force
     return (
         id(contact),
@@ -145,6 +145,6 @@ def _known(contact: GroundContact) -> tuple[object, ...]:
         contact.friction,
         half,
         contact.max_force,
-        id(contact.offset),
+        contact.offset.tobytes(),
         None if force is None else force.tobytes(),
     )
