@@ -38,7 +38,7 @@ from opspace.kernels.columns import (
 )
 from opspace.law import PROFILES
 from opspace.plan.entries import KERNELS
-from opspace.plan.pack_contacts import Footing, PackedContacts, fits
+from opspace.plan.pack_contacts import ContactTick, PackedContacts, fits
 from opspace.plan.plan import Heritage, Plan, structure
 from opspace.plan.read_report import CompiledReport
 from opspace.robots.adapter import AdapterBase
@@ -403,7 +403,7 @@ class Controller(ReferenceController):
         waits = standing.begin(members, self.robot, t)
         return CONTACT_WAITS if waits else 0
 
-    def _stood(self, tau: np.ndarray) -> tuple[Footing, ...]:
+    def _stood(self, tau: np.ndarray) -> tuple[ContactTick, ...]:
         """Learn what a tick gave up, and tell which contacts it had."""
         standing = self._standing
         assert standing is not None

@@ -21,7 +21,7 @@ PACKED = (SoleContact, PointContact)
 """Contacts that compiled code evaluates, by exact type."""
 
 
-class Footing(NamedTuple):
+class ContactTick(NamedTuple):
     """A contact at one tick, as its report needs it."""
 
     contact: GroundContact
@@ -74,7 +74,7 @@ class PackedContacts:
     def __init__(self, axes: MotionAxes, most: int, room: np.ndarray) -> None:
         self.most = most
         self.record = make_stance(axes.v.size, most, room)
-        self.footing: tuple[Footing, ...] = ()
+        self.footing: tuple[ContactTick, ...] = ()
         self._axes = axes
         self._there: list[tuple[object, ...]] = []
         self._motion, self._force = self.record.motion.data, self.record.force.data
@@ -103,7 +103,7 @@ class PackedContacts:
         if there != self._there:
             self._pack([member.contact for member in members])
             self._there = there
-        found: list[Footing] = []
+        found: list[ContactTick] = []
         waits = False
         for i, member in enumerate(members):
             contact, own = member.contact, 1.0
@@ -113,7 +113,7 @@ class PackedContacts:
             motion, force = member.activations(own)
             self._motion[i], self._force[i] = motion, force
             waits |= member.waiting
-            found.append(Footing(contact, member.progress, motion, force, member.waiting))
+            found.append(ContactTick(contact, member.progress, motion, force, member.waiting))
         self.footing = tuple(found)
         return waits
 

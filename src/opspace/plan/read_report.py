@@ -19,7 +19,7 @@ from opspace.command import (
 from opspace.kernels.columns import slot_bit
 from opspace.plan.entries import KERNELS
 from opspace.plan.memory import Reported
-from opspace.plan.pack_contacts import Footing
+from opspace.plan.pack_contacts import ContactTick
 from opspace.plan.records import SPECTRUM
 
 if TYPE_CHECKING:
@@ -37,7 +37,7 @@ class CompiledReport:
 
     __slots__ = ("_footing", "_levels", "_memory", "_parts", "_plan", "_tasks")
 
-    def __init__(self, plan: Plan, memory: bytes, footing: tuple[Footing, ...] = ()) -> None:
+    def __init__(self, plan: Plan, memory: bytes, footing: tuple[ContactTick, ...] = ()) -> None:
         self._plan = plan
         self._footing = footing
         self._memory = memory
