@@ -8,9 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from opspace.kernels.algebra import cholesky, singular_values
-from opspace.kernels.compiled_scalars import profile, ramp
+from opspace.kernels.compiled_scalars import profile, ramp, slot_bit
 from opspace.kernels.corners import sort_corners
-from opspace.kernels.walk import begin, pass_on, slot_bit, walk
+from opspace.kernels.walk import begin, pass_on, walk
 from opspace.law import SigmaBuffer, TaskSet, blended_torque, corners
 from opspace.law.activation import PROFILES, Profile, Ramp
 from opspace.law.hierarchy import whiten

@@ -5,6 +5,7 @@ from __future__ import annotations
 from types import FunctionType
 from typing import Any
 
+from opspace.kernels import columns
 from opspace.law import scalars
 from opspace.machine.jit import jit
 
@@ -36,3 +37,4 @@ speed_scale = _COMPILED["speed_scale"]
 without_turns = _COMPILED["without_turns"]
 room_for = _COMPILED["room_for"]
 entering_weight = _COMPILED["entering_weight"]
+slot_bit = jit(columns.slot_bit)
