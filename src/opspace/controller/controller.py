@@ -151,6 +151,8 @@ class Controller(ReferenceController):
                 robot.check_state(robot.q, robot.v)
             return self._hold(t, STATUSES[timing | FAULT])
         status = STATUSES[answer % SOLVE | timing]
+        if timing and self._forces is not None:  # the tick knows what happened in it
+            self._forces.after(status)
         # Bytes are copied in half the time of an array; the tuple's own constructor takes twice this.
         command = NEW(
             Command, (t, torque(), status, answer // SOLVE, CompiledReport(plan, memory()))
@@ -337,6 +339,7 @@ class Controller(ReferenceController):
         heritage, laid_out = found
         plan = laid_out[1]
         plan.go_on(heritage, members)
+        plan.remember()
         if self._readable:
             plan.come_back(self._blending)
             self._readable = False

@@ -29,6 +29,7 @@ class Sizes(NamedTuple):
     balls: int = 0
     sets: int = 0
     distances: int = 0
+    presses: int = 0
 
     def by_name(self) -> dict[str, int]:
         """Return them as the tables of `opspace.plan.records` take them."""
