@@ -25,7 +25,7 @@ from opspace.kernels.compiled_scalars import (
     passed,
 )
 from opspace.kernels.inertia import whiten_rows
-from opspace.kernels.motion import A, P, R, V, measure, move_joints
+from opspace.kernels.motion import A, P, R, V, cross_add, measure, move_joints
 from opspace.law.press_columns import (
     AHEAD,
     ALONG,
@@ -55,13 +55,14 @@ from opspace.law.press_columns import (
     PASSED,
     PUSH,
     SIGMA,
+    SLIDING,
     SPEED,
     TRAVEL,
     WANTED,
     WHEN,
     WRENCH,
 )
-from opspace.law.scalars import FRICTION_FILTER, LEVER, WRENCH_FILTER
+from opspace.law.scalars import FRICTION_FILTER, LEVER, SLIDING_SPEED, WRENCH_FILTER
 from opspace.machine.jit import jit
 
 STALE = int(Status.WRENCH_STALE)
@@ -166,7 +167,8 @@ def _learn(t, work, i, row):
             total += axes[r, c] * row[WRENCH + c]
         row[MEASURED + r] = total
     if fresh:
-        _feel(work, rows, row, dt)
+        _feel(rows, row, dt)
+        _rub(work, rows, row, dt)
     for r in range(rows):
         missing = row[PUSH + r] - row[MEASURED + r]
         row[COMMANDED + r] = row[PUSH + r] + row[KP] * missing + row[INTEGRAL + r]
@@ -189,7 +191,7 @@ def _begin(t, work, i, row):
         for c in range(6):
             row[WRENCH + c] = row[GIVEN + c]
         for c in range(3):
-            row[ALONG + c] = 0.0
+            row[ALONG + c], row[SLIDING + c] = 0.0, 0.0
         row[BEGUN] = 1.0
     row[WHEN], row[PASSED] = t, dt
     return dt
@@ -213,22 +215,13 @@ def _direction(row, size, r):
 
 
 @jit
-def _feel(work, rows, row, dt):
-    """Learn confidence, friction and integral from the filtered wrench."""
-    axes, size, pressed = work.press_axes, _size(row), 0.0
+def _feel(rows, row, dt):
+    """Learn confidence and integral from the filtered wrench."""
+    size, pressed = _size(row), 0.0
     for r in range(rows):
         pressed += _direction(row, size, r) * row[MEASURED + r]
     c = confidence(row[CONFIDENCE], pressed, row[OFF], row[ON], dt)
     row[CONFIDENCE] = c
-    part = lag(dt, FRICTION_FILTER)
-    for k in range(3):
-        now = row[WRENCH + k]
-        for r in range(rows):
-            along = 0.0
-            for j in range(3):
-                along += axes[r, j] * row[WRENCH + j]
-            now -= axes[r, k] * along
-        row[ALONG + k] += part * (now - row[ALONG + k])
     if row[FROZEN] != 0.0:
         return
     for r in range(rows):
@@ -238,6 +231,41 @@ def _feel(work, rows, row, dt):
         force = row[PUSH + r]
         missing = force - row[MEASURED + r]
         row[INTEGRAL + r] = integral_after(row[INTEGRAL + r], missing, force, bound, row[KI], c, dt)
+
+
+@jit
+def _rub(work, rows, row, dt):
+    """Learn the force along the surface, which turns with the direction of sliding."""
+    x = work.motion[0]
+    before = row[SLIDING], row[SLIDING + 1], row[SLIDING + 2]
+    total = SLIDING_SPEED * SLIDING_SPEED
+    for k in range(3):
+        row[SLIDING + k] = _tangential(work, rows, x, V, k)
+        total += row[SLIDING + k] * row[SLIDING + k]
+    size = math.sqrt(total)
+    for k in range(3):
+        row[SLIDING + k] /= size
+    if dt > 0.0:
+        (a, b, c), u = before, row[SLIDING : SLIDING + 3]
+        turn = b * u[2] - c * u[1], c * u[0] - a * u[2], a * u[1] - b * u[0]
+        fx, fy, fz = row[ALONG], row[ALONG + 1], row[ALONG + 2]
+        cross_add(row, ALONG, turn[0], turn[1], turn[2], fx, fy, fz)
+    part = lag(dt, FRICTION_FILTER)
+    for k in range(3):
+        now = _tangential(work, rows, row, WRENCH, k)
+        row[ALONG + k] += part * (now - row[ALONG + k])
+
+
+@jit
+def _tangential(work, rows, x, at, k):
+    """Entry k of the vector x[at:at + 3] along the surface: (1 − Nᵀ N) x with the linear rows N."""
+    axes, found = work.press_axes, x[at + k]
+    for r in range(rows):
+        along = 0.0
+        for j in range(3):
+            along += axes[r, j] * x[at + j]
+        found -= axes[r, k] * along
+    return found
 
 
 @jit

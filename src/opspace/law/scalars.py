@@ -433,6 +433,8 @@ WRENCH_FILTER = 0.003
 FRICTION_FILTER = 0.03
 """Time constant of the force along the surface that is fed through, s: where the tool sticks this is a
 loop, and the lag is what keeps it slow."""
+SLIDING_SPEED = 0.02
+"""Speed along a surface from which the direction of sliding is known, m/s."""
 UNLOAD = 0.1
 """Time constant with which the integral empties out of contact, s."""
 STALE_AFTER = 0.01

@@ -58,7 +58,6 @@ from opspace.tasks import TASK_KINDS, Task
 from opspace.tasks.activations import checked_activation
 from opspace.tasks.force import ForceTask
 from opspace.tasks.gains import Gains
-from opspace.tasks.impedance import ImpedanceTask
 from opspace.tasks.motion_task import MotionTask
 from opspace.tasks.motions import CenterOfMass, RelativeFrame, WorldFrame
 from opspace.tasks.posture import PostureTask
@@ -98,7 +97,6 @@ def kind_of(task: Task) -> int:
     """
     kind = type(task)
     known = {one.task for one in TASK_KINDS.values()} | {MotionTask, PostureTask}
-    known |= {ForceTask, ImpedanceTask}
     built_in = next((base for base in kind.__mro__ if base in known), None)
     if built_in is None or _overrides(task, built_in) or type(task._gains) is not Gains:
         return OWN

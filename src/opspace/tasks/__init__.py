@@ -54,6 +54,8 @@ TASK_KINDS = MappingProxyType(
         "relative_position": TaskKind(RelativePositionTask, "position"),
         "relative_orientation": TaskKind(RelativeOrientationTask, "orientation"),
         "relative_pose": TaskKind(RelativePoseTask, "pose"),
+        "force": TaskKind(ForceTask, "force", sprung=True),
+        "impedance": TaskKind(ImpedanceTask, "position", sprung=True),
     }
 )
 """Every task that ticks compute from numbers, under the name that scenarios give it."""

@@ -15,6 +15,7 @@ from opspace.law import scalars
 from opspace.tasks.contact import checked_thresholds
 from opspace.tasks.motion_task import AxesFrame, axes_selection
 from opspace.tasks.motions import Motion, WorldFrame, as_offset
+from opspace.tasks.rotation import cross
 from opspace.tasks.task import Task, TaskTerms
 from opspace.tasks.touch_memory import Touch, TouchMemory
 from opspace.tasks.validation import Array, finite, finite_array, positive
@@ -34,7 +35,8 @@ class ForceTask(Task):
         g   = c (Jᵀ F + J_tᵀ F_t)            torque that is balanced by the reaction
 
     where c is the confidence that something is touched (`opspace.law.scalars.confidence`), v_a the
-    speed of the approach along the force and F_t the measured force along the surface. The speed v_a
+    speed of the approach along the force and F_t the measured force along the surface, which turns with
+    the direction of sliding. The speed v_a
     is at most σ |F_d| / kv with σ = J A⁻¹ Jᵀ: with that the arm pushes with F_d at standstill whatever
     c is.
     When the touch is lost the tool follows the surface by ``reach`` and stops there.
@@ -293,6 +295,7 @@ class ForceTask(Task):
             given = memory.part(at.GIVEN, 6)
             wrench += scalars.lag(dt, scalars.WRENCH_FILTER) * (given - wrench)
             self._feel(axes, axes @ wrench, dt)
+            self._rub(axes, motion.velocity[:3], dt)
         measured = axes @ wrench
         memory.part(at.MEASURED)[:] = measured
         memory.part(at.COMMANDED)[:] = (
@@ -314,21 +317,18 @@ class ForceTask(Task):
             memory.part(at.INTEGRAL)[:] = 0.0
             memory.part(at.PUSH)[:] = self._wanted
             memory.part(at.WRENCH, 6)[:] = memory.part(at.GIVEN, 6)
-            memory.part(at.ALONG, 3)[:] = 0.0
+            memory.part(at.ALONG, 3)[:] = memory.part(at.SLIDING, 3)[:] = 0.0
             memory[at.BEGUN] = 1.0
         memory[at.WHEN], memory[at.PASSED] = t, dt
         return dt
 
     def _feel(self, axes: Array, measured: Array, dt: float) -> None:
-        """Learn confidence, friction and integral from the filtered wrench."""
+        """Learn confidence and integral from the filtered wrench."""
         memory = self.memory
-        force, wrench = memory.part(at.PUSH), memory.part(at.WRENCH, 6)
+        force = memory.part(at.PUSH)
         pressed = float(self._direction(force) @ measured)
         c = scalars.confidence(memory[at.CONFIDENCE], pressed, *self._between, dt)
         memory[at.CONFIDENCE] = c
-        along = memory.part(at.ALONG, 3)
-        now = wrench[:3] - axes[:, :3].T @ (axes[:, :3] @ wrench[:3])
-        along += scalars.lag(dt, scalars.FRICTION_FILTER) * (now - along)
         if memory[at.FROZEN]:
             return
         integral = memory.part(at.INTEGRAL)
@@ -337,6 +337,22 @@ class ForceTask(Task):
             integral[i] = scalars.integral_after(
                 float(integral[i]), missing, float(force[i]), float(bound), self._ki, c, dt
             )
+
+    def _rub(self, axes: Array, velocity: Array, dt: float) -> None:
+        """Learn the force along the surface, which turns with the direction u of sliding.
+
+        Ḟ_t = (u × u̇) × F_t + (F − F_t)/τ,  u = v/√(v² + v₀²): what lags is its size alone.
+        """
+        memory = self.memory
+        wrench, along = memory.part(at.WRENCH, 3), memory.part(at.ALONG, 3)
+        sliding, n = memory.part(at.SLIDING, 3), axes[:, :3]
+        u = velocity - n.T @ (n @ velocity)
+        u = u / math.sqrt(float(u @ u) + scalars.SLIDING_SPEED**2)
+        if dt > 0.0:
+            along += cross(cross(sliding, u), along)
+        sliding[:] = u
+        now = wrench - n.T @ (n @ wrench)
+        along += scalars.lag(dt, scalars.FRICTION_FILTER) * (now - along)
 
     def _approach(self, robot: Robot, motion: Motion, axes: Array, dt: float) -> None:
         """Find how fast it may come, and how far."""
