@@ -10,6 +10,7 @@ import pytest
 import opspace as osc
 from opspace.controller import ReferenceController
 from opspace.errors import ScenarioError
+from opspace.runs.forces import measured, run_ways, sweep_stiffness
 from opspace.scenario.build import build
 from opspace.scenario.load import load_scenario, scenario_from
 from opspace.sim import Surface
@@ -102,3 +103,40 @@ def test_a_shipped_scenario_ends_with_its_force_and_without_a_jolt(name, force, 
         built.plant.advance(tau[-1])
     assert -built.plant.exerted[2] == pytest.approx(force, abs=0.5)
     assert np.max(np.abs(np.diff(tau, axis=0))) <= step
+
+
+def test_the_method_switch_touches_all_or_nothing():
+    """What fades by contact is there or not, as events, limits and directions are."""
+    data = {
+        **changed("tasks", "hand", "activation", value={"contact": "press"}).model_dump(mode="json")
+    }
+    built = build(scenario_from({**data, "method": "switch"}))
+    press, found = built.tasks["press"], set()
+    for i in range(30):
+        q, v = built.plant.measure()
+        wrench = np.array([0.0, 0.0, -0.5 * i, 0.0, 0.0, 0.0])
+        command = built.controller.step(i * 1e-3, q, v, wrenches={built.robot.tool: wrench})
+        found.add(command.tasks["hand"].activation)
+        assert press.touch.confidence in (0.0, 1.0)
+    assert found == {0.0, 1.0}
+
+
+@pytest.mark.slow
+def test_touching_in_several_ways_gives_the_promised_numbers():
+    found = measured(run_ways("puma560"))
+    assert found["contact"]["torque_step"] <= 1.6
+    assert found["alone"]["torque_step"] <= 0.7
+    assert found["switch"]["torque_step"] > 8.0
+    for way in ("contact", "alone"):
+        assert found[way]["force_rms"] <= 0.1
+        assert found[way]["away_rms"] <= 0.2
+        assert found[way]["turned_rms"] <= 1.0
+    assert found["rough arm"]["force_rms"] <= 0.3
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("robot", ["puma560", "panda", "ur5", "xarm7"])
+def test_default_gains_hold_on_every_surface(robot):
+    for stiffness, found in sweep_stiffness(robot, (3e2, 1e4, 1e6)).items():
+        assert found["force_rms"] <= (1.5 if stiffness == "3e+02" else 0.1)
+        assert found["losses"] <= 8

@@ -141,6 +141,8 @@ class Controller(ReferenceController):
                 self._leave(members)
                 return self._answer(t, members, STATUSES[timing])
         _, plan, address, torque, memory = laid_out
+        if self._forces is not None:
+            plan.remember()
         if plan.moving or CHANGES.last is not plan.seen:
             if plan.distances is not None and not self._watches_all(plan):
                 _, plan, address, torque, memory = self._lay_out_anew(members)
@@ -339,7 +341,6 @@ class Controller(ReferenceController):
         heritage, laid_out = found
         plan = laid_out[1]
         plan.go_on(heritage, members)
-        plan.remember()
         if self._readable:
             plan.come_back(self._blending)
             self._readable = False
@@ -388,6 +389,7 @@ class Controller(ReferenceController):
         """Go on with the same tasks and other obstacles."""
         laid_out = self._lay_out(members)
         assert laid_out is not None
+        laid_out[1].remember()
         return laid_out
 
     def _options(self) -> np.ndarray:

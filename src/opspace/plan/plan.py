@@ -238,7 +238,7 @@ class Plan:
             i += ROW
 
     def remember(self) -> None:
-        """Be where force tasks remember their contacts from now on."""
+        """Be where force tasks remember their contacts from now on, wherever they did before."""
         for force in self.forces:
             force.keep()
 

@@ -199,7 +199,8 @@ class Scenario(Entry):
     )
     method: Literal["transition", "switch", "none"] = Field(
         default="transition",
-        description="events, joint limits and singular directions fade or switch; with none events "
+        description="events, contacts, joint limits and singular directions fade or switch; with none "
+        "events and contacts "
         "switch and the others are not handled at all",
     )
     torque_limits: Literal["report", "priority"] = Field(

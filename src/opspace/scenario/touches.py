@@ -10,6 +10,7 @@ from opspace.scenario.document import Key
 from opspace.scenario.schema import Scenario
 from opspace.scenario.surface_entries import ActivationEntry
 from opspace.tasks import ActivationUnion, Contact, ForceTask, GiveWay, Task
+from opspace.tasks.contact import HardContact
 from opspace.tasks.motion_task import MotionTask
 
 
@@ -36,7 +37,8 @@ def join_touches(scenario: Scenario, robot: Robot, tasks: Mapping[str, Task]) ->
         task, key = tasks[name], ("tasks", name, "activation")
         activation, touched = entry.activation, None
         if activation is not None and activation.contact is not None:
-            touched = Contact(force((*key, "contact"), activation.contact))
+            kind = Contact if scenario.method == "transition" else HardContact
+            touched = kind(force((*key, "contact"), activation.contact))
         if activation is not None:
             try:
                 task.activation = _joined(activation, touched, robot)

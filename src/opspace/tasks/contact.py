@@ -5,9 +5,11 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from opspace.errors import InputError
+from opspace.law.press_columns import CONFIDENCE
 from opspace.law.scalars import FOLLOW, lag, passed
 from opspace.tasks.references.sample import Constant, Reference, Sample
 from opspace.tasks.references.start import begun
@@ -38,6 +40,24 @@ class Contact:
     def __call__(self, robot: Robot, t: float) -> float:
         """Evaluate the activation at the robot's present state."""
         return self.task.sense(robot, t).confidence
+
+
+class HardContact(Contact):
+    """The switch that a contact replaces: on from the force ``on``, off below ``off``, all or nothing.
+
+    For comparisons. It makes the confidence of the force task 0 or 1 as well.
+    """
+
+    _on = False
+
+    def __call__(self, robot: Robot, t: float) -> float:
+        """Evaluate the activation at the robot's present state."""
+        touch = self.task.sense(robot, t)
+        pressed = float(np.linalg.norm(touch.measured))
+        off, on = self.task.thresholds
+        self._on = pressed > (off if self._on else on)
+        self.task.memory[CONFIDENCE] = float(self._on)
+        return float(self._on)
 
 
 class GiveWay:
