@@ -159,6 +159,21 @@ class ForceTask(Task):
         self._change_gains(finite(value, f"task {self.name!r}: kp"), self._ki)
 
     @property
+    def kv(self) -> float | Array:
+        """Damping, 1/s: a number or (m,)."""
+        return super().kv
+
+    @kv.setter
+    def kv(self, value: ArrayLike | None) -> None:
+        before = self._gains
+        self._set_gains(0.0, value, None)
+        try:
+            self._check_gains()
+        except InputError:
+            self._gains = before
+            raise
+
+    @property
     def ki(self) -> float:
         """Integral gain on the force, 1/s."""
         return self._ki
