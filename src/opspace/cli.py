@@ -200,6 +200,8 @@ class Which(str, Enum):
 
     SINGULARITY = "singularity"
     JOINT_LIMIT = "joint-limit"
+    FORCES = "forces"
+    STIFFNESS = "stiffness"
     ALL = "all"
 
 
@@ -211,7 +213,14 @@ def reproduce(
     ] = "puma560",
     out: Annotated[Path, typer.Option(help="Directory to write to.")] = Path("results"),
 ) -> None:
-    """Repeat the paper's experiments: without the method, with a hard switch, and with it."""
+    """Repeat the paper's experiments: without the method, with a hard switch, and with it.
+
+    Two more are not part of all: forces touches a table in several ways and wipes it, stiffness presses
+    on tables from 3e2 to 1e6 N/m.
+    """
+    if which in (Which.FORCES, Which.STIFFNESS):
+        _reproduce_touch(which, robot, out)
+        return
     from opspace.runs.progress import ProgressBar
     from opspace.runs.reproduce import EXPERIMENTS, draw, reproduce
     from opspace.runs.tables import metrics_table
@@ -225,6 +234,29 @@ def reproduce(
     for problem in draw(done, out):
         print(problem, file=sys.stderr)
     print(f"results: {out}")
+
+
+def _reproduce_touch(which: Which, robot: str, out: Path) -> None:
+    from opspace.runs.forces import (
+        draw_touches,
+        measured,
+        numbers_table,
+        run_ways,
+        sweep_stiffness,
+        write,
+    )
+
+    if which is Which.STIFFNESS:
+        numbers = sweep_stiffness(robot)
+        directory = write(out, which.value, numbers)
+        _print_table(*numbers_table(numbers, "stiffness [N/m]"))
+    else:
+        runs = run_ways(robot)
+        numbers = measured(runs)
+        directory = write(out, which.value, numbers)
+        _print_table(*numbers_table(numbers, "way"))
+        draw_touches(runs, directory / "touch.png")
+    print(f"results: {directory}")
 
 
 @app.command(epilog="Example: opspace compare showpiece --method opspace --method switch")

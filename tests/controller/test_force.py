@@ -128,6 +128,16 @@ def test_gains_that_are_taken_are_stable_on_every_surface(kv, kp, part, mass, de
             osc.ForceTask(kv=kv, kp=kp, ki=ki)
 
 
+def test_gains_that_would_not_hold_are_refused_later_too():
+    press = osc.ForceTask(kv=40.0, ki=8.0)
+    for name, value in (("kv", 10.0), ("kv", None), ("kv", 0.0), ("ki", 30.0)):
+        with pytest.raises(InputError):
+            setattr(press, name, value)
+    assert (press.kv, press.ki) == (40.0, 8.0)
+    press.kv = 20.0
+    assert press.kv == 20.0
+
+
 class Pushing(osc.PositionTask):
     """A position task of one's own that carries a torque."""
 

@@ -21,7 +21,15 @@ ROWS = [
     if line.startswith("| `")
 ]
 NAMED = re.compile(r"`([\w/]+\.py)`((?: `\w+`)+)")
-MAY_IMPORT = ("kernels", "law.scalars", "law", "command", "machine.jit", "robots.joint_kinds")
+MAY_IMPORT = (
+    "kernels",
+    "law.press_columns",
+    "law.scalars",
+    "law",
+    "command",
+    "machine.jit",
+    "robots.joint_kinds",
+)
 
 
 def named(cell):

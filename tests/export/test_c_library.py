@@ -177,6 +177,44 @@ def test_what_is_asked_for_while_it_runs_gives_the_same_bits(tmp_path):
     assert other.read("kind") is None, "whole numbers are not doubles"
 
 
+def pressing():
+    """A controller that presses, gives way with a spring, and is told what it touches."""
+    robot = osc.load_robot("puma560")
+    robot.update(robot.q_reference, np.zeros(robot.nv))
+    press = osc.ForceTask(force=-8.0, axes_frame="world", name="press")
+    press.activation = osc.Contact(press)
+    spring = osc.ImpedanceTask(target=robot.position(robot.frame_id(robot.tool)) - 0.01)
+    stack = osc.Stack([press, spring, osc.PostureTask(robot.q_reference)])
+    return osc.Controller(robot, stack, period=1e-3), press
+
+
+@with_cc
+def test_a_program_that_presses_gives_the_same_bits(tmp_path):
+    controller, press = pressing()
+    ours = InC(tmp_path, controller)
+    T, Q, V = states(controller.robot, 60, 0.1)
+    wrench, down = np.array([0.3, 0.1, 0.0, 0.0, 0.02, 0.0]), np.array([-12.0])
+    assert ours.step(0.0, Q[0], V[0])[0] == -4
+    assert ours.set("wrench", press, 0.0, np.full(6, np.nan)) == -3
+    assert ours.set("wrench", controller.stack.members[2].task, 0.0, wrench) == -3
+    assert ours.set("force", press, np.array([-3.0])) == -3
+    assert ours.set("gains", press, np.zeros(1), np.array([1.0])) == -3
+    assert ours.set("target", press, wrench, None, None) == -3
+    for k, (t, q, v) in enumerate(zip(T.tolist(), Q, V, strict=True)):
+        wrench[2] = -0.3 * k
+        given = None if 30 <= k < 45 else wrench.copy()
+        if given is not None:
+            assert ours.set("wrench", press, t, given) == 0
+        if k == 20:
+            press.force = -12.0
+            assert ours.set("force", press, down) == 0
+        command = controller.step(t, q, v, wrenches={controller.robot.tool: given})
+        status, tau = ours.step(t, q, v)
+        assert status == int(command.status)
+        np.testing.assert_array_equal(tau, command.tau)
+    assert press.touch.confidence > 0.5
+
+
 @with_cc
 def test_a_task_that_is_absent_at_first_comes_as_in_a_stack(tmp_path):
     complete, (*_, posture) = start()

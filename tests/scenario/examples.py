@@ -81,6 +81,15 @@ tasks:
   apart: {type: relative_position, level: 1, reference_frame: link2}
   parallel: {type: relative_orientation, level: 1, reference_frame: link2, target: [1, 0, 0, 0]}
   docked: {type: relative_pose, level: 1, reference_frame: link2, frame: tool}
+  press:
+    type: force
+    level: 0
+    axes: z
+    force: 12
+    moment_axes: xy
+    contact: [1, 4]
+    activation: {contact: press, near: {point: [0.4, 0, 0.5], off: 0.2, on: 0.1}}
+  spring: {type: impedance, level: 2, stiffness: [300, 300, 50], force: [0, 0, -2], give_way: press}
 joint_limits:
   mode: buffer
   buffer: 0.2
@@ -102,6 +111,9 @@ singularity:
   profile: cubic
 plant:
   friction: true
+  wrench_noise: 0.1
+  surfaces:
+    - {point: [0, 0, -3], normal: [0, 0, 1], stiffness: 1e4, size: 0.2, bevel: 0.01, give: 0.002}
   torque_limits: false
 stop:
   max_joint_speed: 20

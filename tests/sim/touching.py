@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 import opspace as osc
+from opspace.law.press_columns import CONFIDENCE
 from opspace.sim import Disturbances
 
 DT = 1e-3
@@ -62,7 +63,7 @@ class HardContact:
     def __call__(self, robot, t):
         pressed = float(np.linalg.norm(self.press.sense(robot, t).measured))
         self.on = pressed > (1.0 if self.on else 3.0)
-        self.press._confidence.value = float(self.on)
+        self.press.memory[CONFIDENCE] = float(self.on)
         return float(self.on)
 
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from opspace.contacts import SoleContact
 from opspace.controller import Controller, ReferenceController
+from opspace.controller.wrenches import Wrenches
 from opspace.errors import missing_extra
 from opspace.plan.scales import DEFAULT_SINGULARITY, Singularity
 from opspace.robots import load_robot
@@ -19,6 +20,7 @@ from opspace.robots.protocol import Robot
 from opspace.stack import Stack
 from opspace.tasks import (
     ComTask,
+    ForceTask,
     JointLimits,
     JointTask,
     OrientationTask,
@@ -53,6 +55,7 @@ class Scene:
         contacts: Gives what a robot with a floating base stands on.
         torque_limits: Whether motors' limits are kept, see `opspace.Controller`.
         sway: How far every joint goes from home, rad.
+        pressed: Force on the world at the tool that every tick is told, N; None is nothing.
     """
 
     title: str
@@ -67,6 +70,7 @@ class Scene:
     contacts: Callable[[], list[SoleContact]] = list
     torque_limits: str = "report"
     sway: float = 0.05
+    pressed: float | None = None
 
     def controller(self, kind: type[ReferenceController] = Controller) -> ReferenceController:
         """Build the library's controller, with its transitions begun."""
@@ -89,6 +93,13 @@ class Scene:
                 stack.remove(task, 2.0 * self.time * (1.0 + 0.1 * k), profile="linear")
             found.step(1e-3, q[0], v[0])
         return found
+
+    @property
+    def wrenches(self) -> Wrenches | None:
+        """What every tick is told of the wrench at the tool."""
+        if self.pressed is None:
+            return None
+        return {self.robot().tool: np.array([0.0, 0.0, self.pressed, 0.0, 0.0, 0.0])}
 
     @property
     def time(self) -> float:
@@ -183,6 +194,22 @@ def _panda(everything: bool) -> Scene:
     )
 
 
+def _down(press: bool) -> Scene:
+    """One axis of the tool, controlled by its position or pressed with a force."""
+
+    def down() -> Task:
+        return ForceTask(name="down") if press else PositionTask(axes="z", name="down")
+
+    return Scene(
+        f"Panda, {'force' if press else 'position'} along one axis above orientation above posture",
+        lambda: load_robot("panda"),
+        lambda: [(down(),), (OrientationTask(),), (PostureTask(),)],
+        PANDA_HOME,
+        peers=False,
+        pressed=10.0 if press else None,
+    )
+
+
 def _ur5(everything: bool) -> Scene:
     plain = "" if everything else ", no limits, no singular directions"
     return Scene(
@@ -201,6 +228,8 @@ SCENES: Mapping[str, Scene] = MappingProxyType(
         "panda-plain": _panda(False),
         "ur5": _ur5(True),
         "ur5-plain": _ur5(False),
+        "axis": _down(False),
+        "press": _down(True),
         "puma": Scene(
             "PUMA 560, orientation above position above posture",
             lambda: load_robot("puma560"),

@@ -27,7 +27,8 @@ def states_per_second(scene: Scene, count: int) -> dict[str, float]:
     controller = scene.controller()
     assert isinstance(controller, Controller)
     Q, V = (np.resize(x, (count, x.shape[1])) for x in scene.states(controller.robot))
-    controller.step(scene.time, Q[0], V[0])  # what has no target holds where it is
+    # What has no target holds where it is.
+    controller.step(scene.time, Q[0], V[0], wrenches=scene.wrenches)
     numbers = sorted({1, cores()})
     times = {threads: np.zeros(TURNS) for threads in numbers}
     for turn in range(-1, TURNS):  # one before the first builds what there is to build

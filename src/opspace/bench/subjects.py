@@ -35,12 +35,13 @@ def subjects(scene: Scene, readable: bool = False) -> dict[str, Tick]:
     controller = scene.controller()
     KERNELS.load()
     t = scene.time
-    found[LIBRARY] = lambda q, v: controller.step(t, q, v)
+    wrenches = scene.wrenches
+    found[LIBRARY] = lambda q, v: controller.step(t, q, v, wrenches=wrenches)
     robot = scene.robot()
     found[MODEL] = _model_calls(robot)
     if readable:
         slow = scene.controller(ReferenceController)
-        found[READABLE] = lambda q, v: slow.step(t, q, v)
+        found[READABLE] = lambda q, v: slow.step(t, q, v, wrenches=wrenches)
     urdf = robot.source is not None and robot.source.suffix == ".urdf"
     if scene.peers and urdf and importlib.util.find_spec("placo") is not None:
         found[PLACO] = placo_tick(scene)

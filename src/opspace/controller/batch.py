@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from opspace.errors import InputError
 from opspace.kernels.columns import OWN, REMEMBERS, TURN
+from opspace.law.press_columns import MEMORY_SIZE
 from opspace.machine.field_table import Record
 from opspace.plan.entries import KERNELS
 from opspace.plan.pack_contacts import fits
@@ -23,7 +24,7 @@ from opspace.robots.bodies import make_dynamics
 from opspace.robots.motion_axes import MotionAxes
 from opspace.robots.rigid_model import RigidModel
 from opspace.stack import ContactMember, Member
-from opspace.tasks.activations import own_activation
+from opspace.tasks.force import ForceTask
 from opspace.tasks.tracking import TrackingTask
 
 CHUNK = 64
@@ -97,12 +98,15 @@ class Batch:
         Raises:
             InputError: A reference or activation gave unusable numbers.
         """
-        own = self._own_activations(Q, V, t)
         first = self._plans[0]
         known = () if before is None else before.variables
         ramps = tuple(variable.ramp for variable in first.variables)
         first.go_on(first.heritage(before, known, first.variables, ramps), first.members)
+        touches = [(one.task.memory, one.task.memory.row.copy()) for one in first.forces]
         self._refresh(t)
+        own = self._own_activations(Q, V, t)
+        for memory, row in touches:  # an activation of the user's own may ask it
+            memory.row[:] = row
         given = {"Q": Q, "V": V, "own": own, "before": _remembered(first)}
         states = STATES.make({}, given)
         ticks, record = KERNELS["ticks"], states.handle()
@@ -141,15 +145,15 @@ class Batch:
     def _own_activations(self, Q: np.ndarray, V: np.ndarray, t: float) -> np.ndarray:
         """Evaluate the activations that users gave to tasks, in Python, state by state."""
         own = np.ones((1, len(self.members)))
-        chosen = [i for i, m in enumerate(self.members) if m.task.activation is not None]
+        chosen = [(i, one) for i, one in enumerate(self.plan.packed) if one.called is not None]
         if not chosen:
             return own
         own = np.ones((len(Q), len(self.members)))
         robot = self.robot.fresh()
         for row, q, v in zip(own, Q, V, strict=True):
             robot.update(q, v)
-            for i in chosen:
-                row[i] = own_activation(self.members[i].task, robot, t)
+            for i, packed in chosen:
+                row[i] = packed.own_activation(robot, t)
         return own
 
 
@@ -245,6 +249,11 @@ def check_members(members: tuple[Member, ...]) -> None:
                 f"task {task.name!r} ({type(task).__name__}) is evaluated in Python, one state "
                 "at a time; a batch takes the tasks of the library only"
             )
+        if isinstance(task, ForceTask) and not task.measured_once:
+            raise InputError(
+                f"task {task.name!r}: the wrench of {task.sensor!r} has never been measured: call step "
+                "before"
+            )
         if isinstance(task, TrackingTask) and task.holds_nothing_yet:
             raise InputError(
                 f"task {task.name!r} will hold what it finds at its first tick: give it a target, "
@@ -269,5 +278,6 @@ def _remembered(plan: Plan) -> Record:
         "group": tick.group.copy(),
         "remembers": tick.kind[:, REMEMBERS].copy(),
         "turn": tick.numbers[:, TURN : TURN + 4].copy(),
+        "press": tick.press[:, :MEMORY_SIZE].copy(),
     }
     return REMEMBERED.make({}, found)

@@ -151,6 +151,8 @@ class Controller(ReferenceController):
                 self._leave(members)
                 return self._answer(t, members, STATUSES[timing])
         _, plan, address, torque, memory = laid_out
+        if self._forces is not None:
+            plan.remember()
         if plan.moving or CHANGES.last is not plan.seen:
             if plan.distances is not None and not self._watches_all(plan):
                 _, plan, address, torque, memory = self._lay_out_anew(members)
@@ -164,6 +166,8 @@ class Controller(ReferenceController):
         if stands:
             footing = self._stood(tau)
         status = STATUSES[answer % SOLVE | timing]
+        if timing and self._forces is not None:  # the tick knows what happened in it
+            self._forces.after(status)
         # Bytes are copied in half the time of an array; the tuple's own constructor takes twice this.
         command = NEW(
             Command, (t, tau, status, answer // SOLVE, CompiledReport(plan, memory(), footing))
@@ -454,6 +458,7 @@ class Controller(ReferenceController):
         """Go on with the same tasks and other obstacles."""
         laid_out = self._lay_out(members)
         assert laid_out is not None
+        laid_out[1].remember()
         return laid_out
 
     def _options(self) -> np.ndarray:

@@ -100,7 +100,7 @@ def _reason(packed: Packed) -> str:
     task = packed.task
     if packed.own_kind:
         why = f"({type(task).__name__}) is evaluated in Python"
-    elif task.activation is not None:
+    elif packed.called is not None:
         why = "has an activation in Python: export it without, and set it from C"
     elif isinstance(task, TrackingTask) and task.holds_nothing_yet:
         why = "will hold what it finds at its first tick: give it a target"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -190,7 +191,6 @@ class ReferenceController:
             if self._forces is None:
                 self._forces = WrenchInput(self._robot)
             self._forces.add(task)
-            self._plain = False
 
     def __repr__(self) -> str:
         handled = "off" if self.singularity is None else repr(self.singularity)
@@ -293,7 +293,7 @@ class ReferenceController:
 
     def _needs_no_more(self) -> bool:
         """Tell whether a command leaves as the tick has made it."""
-        return not self._robot_adds and self._integral is None and self._forces is None
+        return not self._robot_adds and self._integral is None
 
     def _sensed(self, t: float, wrenches: Wrenches | None, members: Sequence[Member]) -> Status:
         """Hand the wrenches of a tick to the tasks that need them."""
@@ -305,8 +305,6 @@ class ReferenceController:
         """Learn from a tick, leave out what the robot adds, mix with another's torque in a handover."""
         if self._handover is None and self._integral is not None:
             self._integral.after(command, members)
-        if self._forces is not None:
-            self._forces.after(command)
         added, handover = self._added_by_robot(), self._handover
         if handover is None:
             return command._replace(tau=command.tau - added) if self._robot_adds else command
@@ -347,7 +345,7 @@ class ReferenceController:
     @property
     def wrenches(self) -> Mapping[str, np.ndarray | None]:
         """Wrenches that the last tick was given, (6,) N and N·m; None where nothing was new."""
-        return {} if self._forces is None else self._forces.given
+        return MappingProxyType({} if self._forces is None else self._forces.given)
 
     def step(
         self, t: float, q: ArrayLike, v: ArrayLike, *, wrenches: Wrenches | None = None
@@ -411,6 +409,8 @@ class ReferenceController:
         elif self._base:
             self._last_torque = tau
         command = Command(t, tau, status | timing, hard_solves, found)
+        if self._forces is not None:
+            self._forces.after(command.status)
         return command if self._plain else self._finished(command, members)
 
     @property

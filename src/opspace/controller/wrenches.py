@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import weakref
 from collections.abc import Iterator, Mapping, Sequence
-from types import MappingProxyType
+from math import isfinite
 from typing import TypeAlias
 
+import numpy as np
 from numpy.typing import ArrayLike
 
-from opspace.command import Command, Status
+from opspace.command import Status
 from opspace.errors import InputError
 from opspace.robots.protocol import Robot
 from opspace.stack import Member
@@ -38,12 +39,16 @@ class WrenchInput:
         self._robot = robot
         self._tasks: list[weakref.ref[ForceTask]] = []
         self._known: set[str] = set()
-        self.given: Mapping[str, Array | None] = MappingProxyType({})
+        self._members: Sequence[Member] | None = None
+        self._present: list[tuple[ForceTask, str]] = []
+        self._away: list[tuple[weakref.ref[ForceTask], str]] = []
+        self.given: Mapping[str, Array | None] = {}
 
     def add(self, task: ForceTask) -> None:
         """Let a task have its wrench from now on."""
         if not any(one is task for one in self._alive()):
             self._tasks = [ref for ref in self._tasks if ref() is not None] + [weakref.ref(task)]
+            self._members = None
 
     def take(self, t: float, wrenches: Wrenches | None, members: Sequence[Member]) -> Status:
         """Check the wrenches of a tick and hand them out.
@@ -61,27 +66,35 @@ class WrenchInput:
             UnknownNameError: There is no frame of this name.
         """
         given = {name: self._checked(name, value) for name, value in (wrenches or {}).items()}
-        present = {id(member.task) for member in members}
+        if members is not self._members:
+            self._look_at(members)
         status = Status.OK
-        for task in self._alive():
-            sensor = task.sensor
+        for task, sensor in self._present:
             if sensor not in given:
-                if id(task) in present:
-                    raise InputError(self._missing(task, given))
-                continue
-            fresh = task.take(t, given[sensor])
-            if id(task) in present:
+                raise InputError(self._missing(task, given))
+            if not task.take(t, given[sensor]):
                 if not task.measured_once:
                     raise InputError(
                         f"task {task.name!r}: the wrench of {sensor!r} has never been measured"
                     )
-                status |= Status.OK if fresh else Status.WRENCH_STALE
-        self.given = MappingProxyType(given)
+                status = Status.WRENCH_STALE
+        for ref, sensor in self._away:
+            if sensor in given and (away := ref()) is not None:
+                away.take(t, given[sensor])
+        self.given = given
         return status
 
-    def after(self, command: Command) -> None:
+    def _look_at(self, members: Sequence[Member]) -> None:
+        """Tell the tasks of a tick from those that are elsewhere but may be asked what they feel."""
+        present = {id(member.task) for member in members}
+        known = [(task, task.sensor) for task in self._alive()]
+        self._present = [one for one in known if id(one[0]) in present]
+        self._away = [(weakref.ref(one), name) for one, name in known if id(one) not in present]
+        self._members = members
+
+    def after(self, status: Status) -> None:
         """Tell force tasks whether anything saturated, so that their integrals do not wind up."""
-        frozen = bool(command.status & FROZEN)
+        frozen = bool(status & FROZEN)
         for task in self._alive():
             task.freeze(frozen)
 
@@ -92,7 +105,12 @@ class WrenchInput:
         if name not in self._known:
             self._robot.frame_id(name)
             self._known.add(name)
-        return None if value is None else finite_array(value, (6,), f"the wrench of {name!r}")
+        if value is None:
+            return None
+        found = np.array(value, dtype=float) if type(value) is np.ndarray else None
+        if found is None or found.shape != (6,) or not isfinite(sum(found.tolist())):
+            return finite_array(value, (6,), f"the wrench of {name!r}")
+        return found
 
     def _missing(self, task: ForceTask, given: Mapping[str, object]) -> str:
         what = f"given: {', '.join(map(repr, sorted(given)))}" if given else "none was given"

@@ -16,6 +16,7 @@ from opspace.controller.reference import ReferenceController
 from opspace.controller.watchdog import JUMP, MISSED
 from opspace.errors import InputError
 from opspace.kernels import columns
+from opspace.law import press_columns
 from opspace.machine.processor import host
 from opspace.plan.entries import KERNELS
 from opspace.plan.pack_task import Packed
@@ -25,7 +26,7 @@ from opspace.tasks.way_round import LARGEST_STEP
 
 SOURCES = Path(__file__).parent / "c"
 COLUMNS = {
-    "KIND": ("KIND_SIZE", "REMEMBERS"),
+    "KIND": ("KIND_SIZE", "REMEMBERS", "KIND", "FORCE", "PRESS"),
     "NUMBERS": (
         *("NUMBERS_SIZE", "GOAL_ROTATION", "GOAL_POSITION", "GOAL_VELOCITY"),
         "GOAL_ACCELERATION",
@@ -35,6 +36,8 @@ COLUMNS = {
     "ANSWER": ("SOLVE",),
 }
 """What the C source must know of `opspace.kernels.columns`, by the array that has it."""
+PRESS = ("GIVEN", "GIVEN_AT", "WANTED", "FORCES", "ON", "KI", "KP", "PRESS_SIZE")
+"""What it must know of `opspace.law.press_columns`."""
 NAME = re.compile(r"[A-Za-z_]\w*", re.ASCII)
 TARGETS = {
     columns.POSITION: (3, 0, 0),
@@ -97,7 +100,7 @@ def export_c(
 def _codes() -> str:
     """What a step answers, and what can be read after it."""
     codes = {f"OPSPACE_{one.name}": int(one) for one in (Status(0), *Status)}
-    refused = {"NOT_FINITE": -1, "NO_TASK": -2, "REFUSED": -3}
+    refused = {"NOT_FINITE": -1, "NO_TASK": -2, "REFUSED": -3, "NO_WRENCH": -4}
     codes |= {f"OPSPACE_{word}": code for word, code in refused.items()}
     enum = "".join(f"    {word} = {code},\n" for word, code in codes.items())
     read = "".join(
@@ -119,6 +122,10 @@ def _layout() -> str:
         f"#define {word if word.endswith('_SIZE') else f'{array}_{word}'} {known[word]}\n"
         for array, words in COLUMNS.items()
         for word in words
+    ]
+    lines += [
+        f"#define {word if word.endswith('_SIZE') else f'PRESS_{word}'} {vars(press_columns)[word]}\n"
+        for word in PRESS
     ]
     numbers = {
         "TARGET_STEP": LARGEST_STEP,
@@ -186,16 +193,21 @@ def _source(name: str, found: Exported) -> str:
 
 def _task(packed: Packed) -> str:
     kind = packed._tick.kind[packed.index]
-    position, rotation, joints = (
-        (0, 0, packed.task.rows)
-        if kind[columns.KIND] == columns.JOINTS
-        else TARGETS[int(kind[columns.QUANTITY])]
-    )
+    position, rotation, joints = _target(packed, kind)
     rows = packed.rows
     return (
         f"{{{_text(packed.task.name)}, {rows.start}, {rows.stop - rows.start}, "
         f"{position}, {rotation}, {joints}}}"
     )
+
+
+def _target(packed: Packed, kind: np.ndarray) -> tuple[int, int, int]:
+    """Numbers of a target: position, rotation, joints."""
+    if kind[columns.KIND] == columns.JOINTS:
+        return 0, 0, packed.task.rows
+    if kind[columns.KIND] == columns.FORCE:
+        return 0, 0, 0
+    return TARGETS[int(kind[columns.QUANTITY])]
 
 
 def _size(found: Exported, name: str) -> int:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from opspace.command import Status
 
 # Kinds of tasks.
-OWN, MOTION, JOINTS, MOMENTUM = range(4)
+OWN, MOTION, JOINTS, MOMENTUM, FORCE = range(5)
 # Where motion is measured.
 WORLD, RELATIVE, CENTRE_OF_MASS = range(3)
 # What is controlled of a motion.
@@ -27,8 +27,13 @@ POSITION, ORIENTATION, POSE = range(3)
     COVERS_ALL,
     REMEMBERS,
     CARRIES,
-) = range(14)
-KIND_SIZE = 14
+    PRESS,
+    SPRING,
+    TOUCH,
+) = range(17)
+KIND_SIZE = 17
+# PRESS: row of ``Tick.press`` of a force task. TOUCH: one plus the row of the force task whose
+# confidence multiplies the activation; below zero, minus that, where either of both is enough.
 
 # Columns of Tick.numbers: a task as numbers. Rotations are by rows, placements by columns.
 LOCAL = 0

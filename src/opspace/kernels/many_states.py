@@ -8,6 +8,7 @@ import numpy as np
 
 from opspace.kernels.columns import BASE, DAMPING, REMEMBERS, TURN
 from opspace.kernels.tick import tick
+from opspace.law.press_columns import MEMORY_SIZE
 from opspace.machine.jit import jit
 
 LARGEST = float(np.finfo(float).max)
@@ -50,6 +51,9 @@ def begin_state(work, before, own):
         work.kind[i, REMEMBERS] = before.remembers[i]
         for c in range(4):
             work.numbers[i, TURN + c] = before.turn[i, c]
+    for p in range(before.press.shape[0]):
+        for c in range(MEMORY_SIZE):
+            work.press[p, c] = before.press[p, c]
 
 
 @jit

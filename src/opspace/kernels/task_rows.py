@@ -22,6 +22,7 @@ from opspace.kernels.columns import (
     REMEMBERS,
     ROWS,
     SPEED_LIMITED,
+    SPRING,
     TOOL_AXES,
     TURN,
 )
@@ -33,14 +34,19 @@ from opspace.kernels.compiled_scalars import (
 )
 from opspace.kernels.momentum_rows import momentum_task
 from opspace.kernels.motion import A, P, R, V, measure, move_joints
+from opspace.kernels.spring_rows import add_spring
 from opspace.law.scalars import SIGNS
 from opspace.machine.jit import jit
 
 
 @jit
-def evaluate_tasks(work):
-    """Fill J (rows, n), drift, error and wanted (rows,), rad or m and s, of every built-in task."""
-    moved = False
+def evaluate_tasks(work, moved):
+    """Fill J (rows, n), drift, error and wanted (rows,), rad or m and s, of every built-in task.
+
+    Args:
+        work: `TICK`; those of force tasks are there already.
+        moved: Whether the bodies' velocities are known.
+    """
     for i in range(work.kind.shape[0]):
         if work.kind[i, KIND] == MOTION:
             if not moved:
@@ -113,6 +119,8 @@ def _motion_task(work, i):
     for row in range(first, first + rows):
         _project(work, i, row, block, size, x, e)
     _accelerations(work, i, first, rows, size)
+    if kind[SPRING] != 0:
+        add_spring(work, i, size)
 
 
 @jit

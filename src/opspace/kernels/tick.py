@@ -11,6 +11,7 @@ from opspace.kernels.columns import (
     COVERS_ALL,
     DAMPING,
     FIRST_ROW,
+    FORCE,
     JOINT,
     JOINTS,
     KEEP_TORQUE,
@@ -35,6 +36,7 @@ from opspace.kernels.contact_rows import close_contacts, contact_corners, evalua
 from opspace.kernels.corners import corners, insert, sort_corners
 from opspace.kernels.distances import measure_distances
 from opspace.kernels.dynamics import evaluate
+from opspace.kernels.force_rows import freeze, press, stale, touched
 from opspace.kernels.inertia import (
     factor,
     torque_of,
@@ -75,11 +77,12 @@ def tick(t, work):
         return STATE_NOT_FINITE
     if work.bodies.kind.shape[0] > 0:
         evaluate(work.bodies, work.q, work.v, work.dynamics)
-    activations(t, work)
-    evaluate_tasks(work)
-    balance(work)
     if not factor(work.M, work.inertia):
         return NOT_POSITIVE_DEFINITE
+    moved = press(t, work)
+    activations(t, work)
+    evaluate_tasks(work, moved)
+    balance(work)
     stacks = blend(work)
     whiten_tasks(work)
     limit_stacks = 0
@@ -97,7 +100,9 @@ def tick(t, work):
         kept = keep_bounds(work, stacks)
     if not _finite(work.tau):
         return NOT_FINITE
-    return (status(work) | kept) + SOLVE * closings * stacks * max(limit_stacks, 1)
+    bits = status(work) | kept | stale(work)
+    freeze(work, bits)
+    return bits + SOLVE * closings * stacks * max(limit_stacks, 1)
 
 
 @jit
@@ -119,7 +124,7 @@ def activations(t, work):
         x = work.variable[i]
         h = ramp(t, int(x[PROFILE]), x[1], x[2], x[3], x[4], x[5], x[6], x[7], x[8])
         if i < tasks:
-            h *= work.own[i]
+            h *= touched(work, i)
             work.h[i] = h
         work.value[i] = h
     exact = 0
@@ -211,7 +216,8 @@ def whiten_task(work, i, n):
     J, Jw, fw, weight = work.J, work.Jw, work.fw, work.row_weight
     first = work.kind[i, FIRST_ROW]
     end = first + work.kind[i, ROWS]
-    of_frame = work.kind[i, KIND] == MOTION and work.kind[i, SOURCE] == WORLD
+    of_frame = work.kind[i, KIND] == MOTION or work.kind[i, KIND] == FORCE
+    of_frame = of_frame and work.kind[i, SOURCE] == WORLD
     for row in range(first, end):
         if work.kind[i, KIND] == JOINTS:
             unit_row(work.inertia, work.coordinate[row], weight[row], Jw[row])

@@ -420,6 +420,96 @@ def speed_scale(speed: float, limit: float) -> float:
     return limit / speed if speed > limit else 1.0
 
 
+# --- Contact of a force task, see `opspace.tasks.force` -----------------------------------------------
+
+RISE, FALL = 0.01, 0.03
+"""Time constants of the confidence when it grows and when it shrinks, s."""
+FOLLOW = 0.02
+"""Time constant with which what follows the tool follows it in contact, s."""
+LONGEST_TICK = 0.1
+"""A pause longer than this is none between two ticks, s."""
+WRENCH_FILTER = 0.003
+"""Time constant of the measured wrench, s."""
+FRICTION_FILTER = 0.03
+"""Time constant of the force along the surface that is fed through, s: where the tool sticks this is a
+loop, and the lag is what keeps it slow."""
+SLIDING_SPEED = 0.02
+"""Speed along a surface from which the direction of sliding is known, m/s."""
+UNLOAD = 0.1
+"""Time constant with which the integral empties out of contact, s."""
+STALE_AFTER = 0.01
+"""Without a new wrench for so long, what was measured last counts for nothing any more, s."""
+LEVER = 0.1
+"""Moment that counts like a force, per N: bounds of the integral of moment rows, m."""
+LIGHTEST = 1e-9
+"""A row that moves less than this mass in the inverse needs no damping of its own, 1/kg."""
+
+
+def passed(t: float, before: float) -> float:
+    """Time between two ticks, 0 where it is not one tick's."""
+    dt = t - before
+    return dt if 0.0 < dt <= LONGEST_TICK else 0.0
+
+
+def lag(dt: float, time: float) -> float:
+    """Part of the way that a first-order lag with this time constant goes in a tick, 0 to 1."""
+    return dt / (time + dt)
+
+
+def is_fresh(age: float) -> bool:
+    """Tell whether a wrench of this age [s] counts."""
+    # Times are sums of floating-point numbers: a millionth more is no time.
+    return age <= STALE_AFTER * (1.0 + 1e-6)
+
+
+def confidence(c: float, force: float, off: float, on: float, dt: float) -> float:
+    """How sure it is that something is touched, one tick later: continuous in time whatever comes.
+
+        c ← c + Δt/(τ + Δt) (P((F − off)/(on − off)) − c)
+
+    P is the quintic profile, τ is `RISE` while c grows and `FALL` while it shrinks.
+
+    Args:
+        c: Confidence of the tick before.
+        force: Measured force, N.
+        off: Force at and below which nothing is touched, N.
+        on: Force at and above which the touch is certain, N.
+        dt: Time since the tick before, s.
+    """
+    wanted = profile(QUINTIC, (force - off) / (on - off))
+    return c + lag(dt, RISE if wanted > c else FALL) * (wanted - c)
+
+
+def floor_of(floor: float, travel: float, c: float, beyond: float, dt: float) -> float:
+    """Where the surface was felt last along the way in, one tick later: ṡ_f = c (s − s_f)/τ, m.
+
+    Infinite before the first touch; it begins ``beyond`` [m] behind the tool.
+    """
+    if c <= 0.0:
+        return floor
+    if math.isinf(floor):
+        floor = travel + beyond
+    return floor + c * lag(dt, FOLLOW) * (travel - floor)
+
+
+def approach(floor: float, reach: float, travel: float, most: float, slope: float) -> float:
+    """Speed v_a = clip(k (s_f + reach − s), ± v) with the slope k [1/s], m/s."""
+    return min(max(slope * (floor + reach - travel), -most), most)
+
+
+def integral_after(
+    integral: float, missing: float, force: float, bound: float, ki: float, c: float, dt: float
+) -> float:
+    """İ = c K_i clip(F_d − F_m, ±|F_d|) − (1 − c) I/`UNLOAD`, one tick later, within ± ``bound``.
+
+    An impact of many times the force, of a few milliseconds, must not unwind it.
+    """
+    most = bound if force == 0.0 else abs(force)
+    grown = c * ki * min(max(missing, -most), most)
+    emptied = (1.0 - c) / UNLOAD * integral
+    return min(max(integral + dt * (grown - emptied), -bound), bound)
+
+
 # --- Levels, motors, bounds --------------------------------------------------------------------------
 
 RANK_TOLERANCE = 1e-8

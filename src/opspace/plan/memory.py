@@ -33,6 +33,7 @@ class Sizes(NamedTuple):
     sets: int = 0
     distances: int = 0
     contacts: int = 0
+    presses: int = 0
 
     def by_name(self) -> dict[str, int]:
         """Return them as the tables of `opspace.plan.records` take them."""

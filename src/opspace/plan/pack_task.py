@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from array import array
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from inspect import isfunction
 from typing import Any
 
@@ -16,6 +16,7 @@ from opspace.kernels.columns import (
     CENTRE_OF_MASS,
     COVERS_ALL,
     FIRST_ROW,
+    FORCE,
     GOAL_ACCELERATION,
     GOAL_POSITION,
     GOAL_ROTATION,
@@ -44,20 +45,21 @@ from opspace.kernels.columns import (
     SOURCE,
     SPEED_LIMITED,
     TOOL_AXES,
+    TOUCH,
     TURN,
     WORLD,
 )
 from opspace.law.scalars import SIGNS
 from opspace.machine.field_table import Record
+from opspace.plan.pack_contact import Activation, activated
 from opspace.robots.adapter import AdapterBase
 from opspace.robots.motion_axes import FramePlace, MotionAxes
 from opspace.stack import Member
 from opspace.tasks import TASK_KINDS, Task
-from opspace.tasks.activations import own_activation
+from opspace.tasks.activations import checked_activation
 from opspace.tasks.angular_momentum import AngularMomentumTask
 from opspace.tasks.force import ForceTask
 from opspace.tasks.gains import Gains
-from opspace.tasks.impedance import ImpedanceTask
 from opspace.tasks.motion_task import MotionTask
 from opspace.tasks.motions import CenterOfMass, RelativeFrame, WorldFrame
 from opspace.tasks.posture import PostureTask
@@ -86,9 +88,6 @@ does."""
 PACKED_ONCE = ("source", "quantity", "selection", "in_tool_axes", "layout", "rows")
 """Attributes that a subclass may not compute anew, as a property would."""
 
-EVALUATED_IN_PYTHON = (ForceTask, ImpedanceTask)
-"""Tasks of the library that no kernel evaluates."""
-
 MOST_JOINTS = 4 * SIGNS
 """Joints of a task whose signs fit into what compiled code remembers of it."""
 
@@ -105,8 +104,8 @@ def kind_of(task: Task) -> int:
     built_in = next((base for base in kind.__mro__ if base in known), None)
     if built_in is None or _overrides(task, built_in) or type(task._gains) is not Gains:
         return OWN
-    if isinstance(task, EVALUATED_IN_PYTHON):
-        return OWN
+    if isinstance(task, ForceTask):
+        return FORCE
     if isinstance(task, PostureTask):
         return JOINTS if task.rows <= MOST_JOINTS and _of_joints(task) else OWN
     assert isinstance(task, MotionTask)
@@ -152,10 +151,17 @@ class Packed:
         first: Its first row among those of all tasks.
         axes: The robot's arrays.
         tick: The arrays of the plan.
+        presses: Rows of force tasks in ``press``, by identity.
     """
 
     def __init__(
-        self, member: Member, index: int, first: int, axes: MotionAxes, tick: Record
+        self,
+        member: Member,
+        index: int,
+        first: int,
+        axes: MotionAxes,
+        tick: Record,
+        presses: Mapping[int, int],
     ) -> None:
         task = member.task
         self.task: Any = task
@@ -165,7 +171,9 @@ class Packed:
         self.own_kind = code == OWN
         self.moving = True
         self._timed = False
-        self._own_activation = False
+        self._presses = presses
+        self._activation: Activation | None = None
+        self.called: Activation | None = None
         self._tick = tick
         self.target: object = None
         self.held: object = None
@@ -181,8 +189,10 @@ class Packed:
         self.turn = tick.numbers[index, TURN : TURN + 4].data
         self.way_round: WayRound | None = None
         self._turning = np.zeros(0)
+        self._take_activation()
         if kind[KIND] == MOTION:
             self._pack_source(axes)
+            kind[QUANTITY] = QUANTITIES[type(self.task.quantity)]
             if kind[QUANTITY] != POSITION:
                 self.way_round = self.task.quantity.turn
                 self._turning = tick.numbers[index, GOAL_ROTATION : GOAL_ROTATION + 9]
@@ -193,6 +203,7 @@ class Packed:
             if layout.endless.any():
                 self.way_round = self.task.turn
                 self._turning = tick.goal[self.rows, 0]
+        self._pack_more(axes)
         self._pack_ahead()
 
     def refresh(self, robot: AdapterBase, t: float) -> None:
@@ -206,18 +217,31 @@ class Packed:
             InputError: A reference or a task of the user's own gave unusable numbers.
         """
         task = self.task
-        if task.activation is not None:
+        if task.activation is not self._activation:
+            self._take_activation()
+        if self.called is not None:
             robot.check_state(robot.q, robot.v)
-            self._tick.own[self.index] = own_activation(task, robot, t)
-            self._own_activation = True
-        elif self._own_activation:
-            self._tick.own[self.index] = 1.0
-            self._own_activation = False
+            self._tick.own[self.index] = self.own_activation(robot, t)
         if self.own_kind:
             self._evaluate(robot, t)
         elif self._changed:
             self._pack(robot, t)
-        self.moving = self.own_kind or self._timed or self._own_activation or _silent(task)
+        self.moving = self.own_kind or self._timed or self.called is not None or _silent(task)
+
+    def own_activation(self, robot: AdapterBase, t: float) -> float:
+        """Evaluate what Python evaluates of the task's own activation, 1 where that is nothing.
+
+        Raises:
+            InputError: It is not in [0, 1].
+        """
+        return checked_activation(f"task {self.task.name!r}", self.called, robot, t)
+
+    def _take_activation(self) -> None:
+        """Look how the task is activated; what is a contact's is compiled."""
+        self._activation = self.task.activation
+        touch, self.called = activated(self._activation, self._presses)
+        self._tick.kind[self.index, TOUCH] = touch
+        self._tick.own[self.index] = 1.0
 
     @property
     def _changed(self) -> bool:
@@ -234,7 +258,7 @@ class Packed:
     def settled(self) -> bool:
         """Whether all is packed that a tick would pack, until the task says that it has changed."""
         task = self.task
-        if self.own_kind or task.activation is not None or _silent(task):
+        if self.own_kind or self.called is not None or _silent(task):
             return False
         return self._packed_ahead
 
@@ -311,6 +335,9 @@ class Packed:
             f"{'' if np.isfinite(found).all() else ' with numbers that are not finite'}"
         )
 
+    def _pack_more(self, axes: MotionAxes) -> None:
+        """Pack what only tasks of one kind have, and keep."""
+
     def _pack_ahead(self) -> None:
         """Pack what is known before the tick, from any thread; `refresh` sees what changes later."""
         task = self.task
@@ -376,7 +403,6 @@ class Packed:
         number = self._tick.numbers[self.index]
         source = task.source
         kind[SOURCE] = SOURCES[type(source)]
-        kind[QUANTITY] = QUANTITIES[type(task.quantity)]
         kind[TOOL_AXES] = int(task.in_tool_axes)
         selection = task.selection
         self._tick.select[self.rows] = 0.0

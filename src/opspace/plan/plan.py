@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from struct import Struct
 from typing import NamedTuple
 
@@ -17,7 +17,6 @@ from opspace.kernels.columns import (
     LIMIT_LAW,
     LIMIT_PROFILE,
     LIMIT_WEIGHT,
-    MOMENTUM,
     VARIABLE_SIZE,
 )
 from opspace.kernels.limit_columns import DISTURBANCE, SIGN, SPEED
@@ -28,8 +27,8 @@ from opspace.machine.record import WORD
 from opspace.plan.memory import Sizes, make_tick
 from opspace.plan.pack_contacts import PackedContacts
 from opspace.plan.pack_distances import PackedDistances
-from opspace.plan.pack_momentum import PackedMomentum
-from opspace.plan.pack_task import Packed, kind_of
+from opspace.plan.pack_force import PackedForce, pack, presses_of
+from opspace.plan.pack_task import Packed
 from opspace.plan.scales import Scales
 from opspace.robots.adapter import AdapterBase
 from opspace.robots.motion_axes import MotionAxes
@@ -112,6 +111,7 @@ class Plan:
         )
         last = CHANGES.last
         layout = None if guard is None else guard.layout()
+        presses = presses_of(members)
         self.size = Sizes(
             n=axes.v.size,
             tasks=len(members),
@@ -126,11 +126,13 @@ class Plan:
             sets=0 if layout is None else layout.set_frame.size,
             distances=0 if layout is None else len(layout.rows),
             contacts=0 if contacts is None else contacts.most,
+            presses=len(presses),
         )
         self.contacts = contacts
         stance = None if contacts is None else contacts.record
         self.tick, self.memory = make_tick(self.size, axes, torque_limit, options, stance)
-        self.packed = self._pack(scales)
+        self.packed = self._pack(scales, presses)
+        self.forces = [packed for packed in self.packed if isinstance(packed, PackedForce)]
         self.distances: PackedDistances | None = None
         if guard is not None and layout is not None:
             self.distances = PackedDistances(guard, layout, axes, self.tick)
@@ -231,6 +233,8 @@ class Plan:
                 packed.remember(earlier)
                 if packed.target is None:
                     self.seen = None
+        for force in self.forces:
+            force.take_up()
         rows = self._ramps
         rows[:] = heritage.packed
         i = 0
@@ -238,6 +242,11 @@ class Plan:
             if variable.ramp is not ramp:  # it started at another time than was expected
                 rows[i : i + ROW] = _packed(variable.ramp)
             i += ROW
+
+    def remember(self) -> None:
+        """Be where force tasks remember their contacts from now on, wherever they did before."""
+        for force in self.forces:
+            force.keep()
 
     def forget_ways(self) -> None:
         """Let all angles take the short way at the next tick."""
@@ -259,12 +268,11 @@ class Plan:
             packed.come_back()
         self.seen = None
 
-    def _pack(self, scales: Scales) -> list[Packed]:
+    def _pack(self, scales: Scales, presses: Mapping[int, int]) -> list[Packed]:
         packed: list[Packed] = []
         first = 0
         for i, member in enumerate(self.members):
-            momentum = kind_of(member.task) == MOMENTUM
-            entry = (PackedMomentum if momentum else Packed)(member, i, first, self.axes, self.tick)
+            entry = pack(member, i, first, self.axes, self.tick, presses)
             self.tick.row_weight[entry.rows] = 1.0 / np.sqrt(scales.reference(member.task))
             first = entry.rows.stop
             packed.append(entry)

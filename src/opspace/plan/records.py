@@ -13,6 +13,7 @@ from opspace.kernels.columns import (
     OPTION_SIZE,
     VARIABLE_SIZE,
 )
+from opspace.law.press_columns import MEMORY_SIZE, PRESS_SIZE
 from opspace.machine.field_table import Field, RecordTable
 from opspace.plan.bound_records import BOUNDS
 from opspace.plan.contact_records import STANCE
@@ -35,6 +36,7 @@ SIZES = {
     "sets": "convex sets that they keep away from",
     "distances": "pairs of a ball and a set",
     "contacts": "contacts that can be there at once, none of a robot that is bolted down",
+    "presses": "force tasks",
     "corners": "corners that the blend can have",
     "widest": "the largest of rows + limits, n and 6 contacts, at least one",
     "states": "states of a batch",
@@ -137,6 +139,11 @@ TICK = RecordTable(
     _refresh("goal", ("rows", 3), "q, v, a that joint tasks want", "rad, rad/s, rad/s²"),
     _refresh("kp", ("rows",), "gain on the error", "1/s²"),
     _refresh("kv", ("rows",), "gain on its rate", "1/s"),
+    _refresh(
+        "spring", ("rows", 3), "K, 2 ζ √K and force of impedance rows", "N/m, N·m/rad, N, N·m"
+    ),
+    _tuned("press", ("presses", PRESS_SIZE), "force tasks, see `opspace.law.press_columns`"),
+    _work("press_axes", (6, 6), "rows of a force task in world axes"),
     _plan("row_weight", ("rows",), "1/√reference", start=1.0),
     _plan(
         "variable", ("variables", VARIABLE_SIZE), "an activation in time, as `ramp` takes it", "s"
@@ -215,6 +222,7 @@ REMEMBERED = RecordTable(
     _caller("group", ("variables",), "how each activation is blended", dtype=_INT),
     _caller("remembers", ("tasks",), "whether the turn is known", dtype=_INT),
     _caller("turn", ("tasks", 4), "last rotation of the task, quaternion wxyz"),
+    _caller("press", ("presses", MEMORY_SIZE), "what force tasks remember"),
 )
 
 STATES = RecordTable(

@@ -7,6 +7,7 @@ try:
 except ImportError:
     raise missing_extra("matplotlib", "sim") from None
 
+from opspace.plots.forces import touch_figure as touch_figure
 from opspace.plots.joint_limit import joint_limit_figures as joint_limit_figures
 from opspace.plots.overview import overview_figure as overview_figure
 from opspace.plots.plot_columns import overlay_columns as overlay_columns

@@ -14,16 +14,17 @@ from opspace.scenario.references import Values, as_reference, build_target, rota
 from opspace.scenario.schema import Scenario
 from opspace.scenario.targets import PoseParts
 from opspace.scenario.task_entries import TaskEntry
-from opspace.tasks import TASK_KINDS, PoseReference, PostureTask
+from opspace.scenario.touches import join_touches
+from opspace.tasks import TASK_KINDS, PoseReference, PostureTask, Task
 from opspace.tasks.joint_layout import joint_layout
 from opspace.tasks.motion_task import MotionTask
 from opspace.tasks.tracking import TrackingTask
 from opspace.tasks.validation import Array
 
-_NOT_OPTIONS = ("type", "level", "present", "target")
+_NOT_OPTIONS = ("type", "level", "present", "target", "activation", "give_way")
 
 
-def build_tasks(scenario: Scenario, robot: Robot) -> dict[str, TrackingTask]:
+def build_tasks(scenario: Scenario, robot: Robot) -> dict[str, Task]:
     """Build every task of a scenario.
 
     Args:
@@ -36,7 +37,7 @@ def build_tasks(scenario: Scenario, robot: Robot) -> dict[str, TrackingTask]:
     Raises:
         ScenarioError: A name that the robot does not have, or a value that does not fit it.
     """
-    built: dict[str, TrackingTask] = {}
+    built: dict[str, Task] = {}
     for name, entry in scenario.tasks.items():
         for key, problem in _unknown_names(entry, robot):
             raise scenario.error(("tasks", name, *key), problem) from None
@@ -49,10 +50,12 @@ def build_tasks(scenario: Scenario, robot: Robot) -> dict[str, TrackingTask]:
         except OpspaceError as error:
             raise scenario.error(("tasks", name), str(error)) from error
         try:
-            task.target = _target(task, entry, robot)
+            if isinstance(task, TrackingTask):
+                task.target = _target(task, entry, robot)
         except OpspaceError as error:
             raise scenario.error(("tasks", name, "target"), str(error)) from error
         built[name] = task
+    join_touches(scenario, robot, built)
     return built
 
 

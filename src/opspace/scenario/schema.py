@@ -13,6 +13,7 @@ from opspace.scenario.document import Document, Key, key_text
 from opspace.scenario.events import Event, ProfileName, check_events
 from opspace.scenario.fields import Checked, Entry, Number, problem, shown, whole
 from opspace.scenario.obstacle_entries import CollisionsEntry
+from opspace.scenario.surface_entries import SurfaceEntry
 from opspace.scenario.targets import Configuration
 from opspace.scenario.task_entries import AnyTask
 
@@ -129,6 +130,16 @@ class PlantEntry(Entry):
     pushes: list[PushEntry] = Field(
         default_factory=list, description="forces on the tool, with times"
     )
+    surfaces: list[SurfaceEntry] = Field(
+        default_factory=list, description="what the tool may press; the wrench there is measured"
+    )
+    wrench_noise: Annotated[float, Number("N", at_least=0.0)] = Field(
+        default=0.0,
+        description="standard deviation of measured forces [N]; of moments a tenth of it [N·m]",
+    )
+    wrench_delay: Annotated[float, Number("s", at_least=0.0, at_most=0.1)] = Field(
+        default=0.0, description="how late a wrench is measured [s], in whole ticks"
+    )
     torque_limits: bool = Field(
         default=True, description="saturate the torque at the robot's limits"
     )
@@ -188,7 +199,8 @@ class Scenario(Entry):
     )
     method: Literal["transition", "switch", "none"] = Field(
         default="transition",
-        description="events, joint limits and singular directions fade or switch; with none events "
+        description="events, contacts, joint limits and singular directions fade or switch; with none "
+        "events and contacts "
         "switch and the others are not handled at all",
     )
     torque_limits: Literal["report", "priority"] = Field(

@@ -19,6 +19,7 @@ from typing import (
 from pydantic import AfterValidator, Discriminator, Field, Tag, create_model, model_validator
 
 from opspace.scenario.fields import Checked, Entry, Number, problem, shown, whole
+from opspace.scenario.surface_entries import ActivationEntry
 from opspace.scenario.targets import (
     JointTarget,
     OrientationTarget,
@@ -49,6 +50,9 @@ PoseAccelerations = Annotated[
 ]
 PoseSpeeds = Annotated[tuple[float, ...], Number("linear m/s, angular rad/s", above=0.0, size=2)]
 
+GIVING_WAY = ("position", "impedance")
+"""Tasks whose target may give way to what is pressed."""
+_GIVE_WAY = "name of the force task along whose force the target follows the tool in contact"
 _TARGET = "value or reference to follow; null holds the value at the start"
 
 
@@ -60,13 +64,21 @@ class TaskEntry(Entry):
         default=True,
         description="whether it is in the stack at the start; one that an event inserts first is not",
     )
-    kp: Stiffness = Field(default=100.0, description="stiffness [1/s²], a number or one per row")
-    kv: Damping | None = Field(
-        default=None, description="damping [1/s]; null is critical, 2 sqrt(kp)"
+    activation: ActivationEntry | None = Field(
+        default=None, description="what its presence is multiplied with; null is nothing"
     )
     if TYPE_CHECKING:  # every kind has its own
         type: str
         target: Any
+
+
+class GainsEntry(TaskEntry):
+    """What tasks have that follow a target."""
+
+    kp: Stiffness = Field(default=100.0, description="stiffness [1/s²], a number or one per row")
+    kv: Damping | None = Field(
+        default=None, description="damping [1/s]; null is critical, 2 sqrt(kp)"
+    )
 
     def rows(self) -> int | None:
         """Number of task rows, None where only the robot knows it."""
@@ -130,7 +142,7 @@ _ARGUMENTS: Mapping[str, _Argument] = {
 """Arguments that mean the same in every task; others are read by their type."""
 
 _SPEED = "speed that the error may ask for"
-_CONTROLLED: Mapping[str, Mapping[str, _Argument]] = {
+_TRACKED: Mapping[str, Mapping[str, _Argument]] = {
     controls: {
         "target": _Argument(_nullable(target), _TARGET),
         "max_speed": _Argument(_nullable(speed), f"{words}; null is no limit"),
@@ -146,7 +158,50 @@ _CONTROLLED: Mapping[str, Mapping[str, _Argument]] = {
         ("joints", PostureTarget, JointSpeed, JointAcceleration, f"norm of the {_SPEED} [rad/s]"),
     )
 }
-_ALWAYS = ("self", "name", *TaskEntry.model_fields)
+_CONTROLLED: Mapping[str, Mapping[str, _Argument]] = {
+    **_TRACKED,
+    "force": {
+        "force": _Argument(
+            Annotated[Gain, Number("N", size="rows")],
+            "force along the axes [N], a number or one each",
+        ),
+        "moment": _Argument(
+            Annotated[Gain, Number("N·m", size="rows")],
+            "moment about the moment axes [N·m], a number or one each",
+        ),
+        "moment_axes": _Argument(
+            Annotated[str, AfterValidator(lambda axes: _check_axes(axes) if axes else axes)],
+            "axes with a moment, some of the letters xyz",
+        ),
+        "kv": _Argument(Damping, "damping [1/s], a number or one per row"),
+        "contact": _Argument(
+            _nullable(Annotated[tuple[float, ...], Number("N", above=0.0, size=2)]),
+            "forces off and on between which the confidence rises [N]; null goes by the force",
+        ),
+    },
+}
+
+
+def _check_three(value: float | tuple[float, ...]) -> float | tuple[float, ...]:
+    if isinstance(value, tuple) and len(value) != 3:
+        raise problem(f"must be a number or a list of 3 numbers, not {len(value)}")
+    return value
+
+
+_IMPEDANCE: Mapping[str, _Argument] = {
+    "stiffness": _Argument(
+        Annotated[
+            float | tuple[float, ...],
+            Number("N/m", at_least=0.0, size="rows"),
+            AfterValidator(_check_three),
+        ],
+        "stiffness [N/m], a number or one per axis",
+    ),
+    "force": _Argument(
+        _nullable(Annotated[tuple[float, ...], Number("N", size=3)]),
+        "force beside the spring's [N]; null is none",
+    ),
+}
 _PLAIN: Mapping[Any, Any] = {float: Annotated[float, Number("1")], bool: bool, str: str}
 
 
@@ -162,9 +217,14 @@ def make_entry(name: str, kind: TaskKind) -> type[TaskEntry]:
         ``present``.
     """
     known = {**_ARGUMENTS, **_CONTROLLED[kind.controls]}
+    if name == "impedance":
+        known |= _IMPEDANCE
+    base = TaskEntry if kind.sprung else GainsEntry
     fields: dict[str, Any] = {"type": (Literal[name], Field(description=name))}
+    if name in GIVING_WAY:
+        fields["give_way"] = str | None, Field(default=None, description=_GIVE_WAY)
     for key, argument in inspect.signature(kind.task).parameters.items():
-        if key in _ALWAYS:
+        if key in ("self", "name") or key in base.model_fields:
             continue
         takes, means = known.get(key) or _by_type(kind, key)
         default = argument.default
@@ -172,7 +232,7 @@ def make_entry(name: str, kind: TaskKind) -> type[TaskEntry]:
             default = None if key == "frame" else ...
         fields[key] = (takes, Field(default=default, description=means))
     camel = name.title().replace("_", "")
-    return create_model(f"{camel}Entry", __base__=TaskEntry, __module__=__name__, **fields)
+    return create_model(f"{camel}Entry", __base__=base, __module__=__name__, **fields)
 
 
 def _by_type(kind: TaskKind, key: str) -> _Argument:

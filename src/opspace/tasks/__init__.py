@@ -12,7 +12,6 @@ from opspace.tasks.com import ComTask as ComTask
 from opspace.tasks.contact import Contact as Contact
 from opspace.tasks.contact import GiveWay as GiveWay
 from opspace.tasks.force import ForceTask as ForceTask
-from opspace.tasks.force import Touch as Touch
 from opspace.tasks.impedance import ImpedanceTask as ImpedanceTask
 from opspace.tasks.joint import JointTask as JointTask
 from opspace.tasks.joint_limits import JointLimits as JointLimits
@@ -41,6 +40,7 @@ from opspace.tasks.relative import RelativePoseTask as RelativePoseTask
 from opspace.tasks.relative import RelativePositionTask as RelativePositionTask
 from opspace.tasks.task import Task as Task
 from opspace.tasks.task import TaskTerms as TaskTerms
+from opspace.tasks.touch_memory import Touch as Touch
 from opspace.tasks.tracking import TrackingTask as TrackingTask
 
 TASK_KINDS = MappingProxyType(
@@ -54,6 +54,8 @@ TASK_KINDS = MappingProxyType(
         "relative_position": TaskKind(RelativePositionTask, "position"),
         "relative_orientation": TaskKind(RelativeOrientationTask, "orientation"),
         "relative_pose": TaskKind(RelativePoseTask, "pose"),
+        "force": TaskKind(ForceTask, "force", sprung=True),
+        "impedance": TaskKind(ImpedanceTask, "position", sprung=True),
     }
 )
 """Every task that ticks compute from numbers, under the name that scenarios give it."""

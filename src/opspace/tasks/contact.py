@@ -5,84 +5,19 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from opspace.errors import InputError
-from opspace.law.scalars import QUINTIC, profile
+from opspace.law.press_columns import CONFIDENCE
+from opspace.law.scalars import FOLLOW, lag, passed
 from opspace.tasks.references.sample import Constant, Reference, Sample
 from opspace.tasks.references.start import begun
+from opspace.tasks.validation import Array
 
 if TYPE_CHECKING:
     from opspace.robots.protocol import Robot
     from opspace.tasks.force import ForceTask
-
-RISE, FALL = 0.01, 0.03
-"""Time constants of the confidence when it grows and when it shrinks, s."""
-FOLLOW = 0.02
-"""Time constant with which what follows the tool follows it in contact, s."""
-LONGEST = 0.1
-"""A pause longer than this is none between two ticks, s."""
-
-
-def lag(dt: float, time: float) -> float:
-    """Part of the way that a first-order lag with this time constant goes in a tick, 0 to 1."""
-    return dt / (time + dt)
-
-
-class Confidence:
-    """How sure it is that the tool touches: c from 0 to 1, continuous in time whatever is measured.
-
-        c ← c + Δt/(τ + Δt) (P((F − off)/(on − off)) − c)
-
-    P is the quintic profile, τ is `RISE` while c grows and `FALL` while it shrinks.
-
-    Args:
-        off: Force at and below which nothing is touched, N.
-        on: Force at and above which the touch is certain, N.
-    """
-
-    def __init__(self, off: float, on: float) -> None:
-        self.off, self.on = off, on
-        self.value = 0.0
-
-    def learn(self, force: float, dt: float) -> float:
-        """Count one measured force [N], ``dt`` [s] after the one before."""
-        s = min(max((force - self.off) / (self.on - self.off), 0.0), 1.0)
-        wanted = profile(QUINTIC, s)
-        time = RISE if wanted > self.value else FALL
-        self.value += lag(dt, time) * (wanted - self.value)
-        return self.value
-
-
-class Reach:
-    """How far a tool goes on when it loses the surface.
-
-    In contact the floor follows the tool with the time constant `FOLLOW`; out of contact the tool may
-    go ``reach`` beyond it, at a speed that falls to zero there:
-
-        ṡ_f = c (s − s_f)/τ,        v_a = clip(k (s_f + reach − s), ± v)
-
-    Before the first touch there is no floor.
-
-    Args:
-        reach: m.
-    """
-
-    def __init__(self, reach: float) -> None:
-        self.reach = reach
-        self.floor = math.inf
-
-    def learn(self, travel: float, confidence: float, beyond: float, dt: float) -> None:
-        """Count where the tool is along the way in, m; the floor begins ``beyond`` [m] behind it."""
-        if confidence <= 0.0:
-            return
-        if math.isinf(self.floor):
-            self.floor = travel + beyond
-        self.floor += confidence * lag(dt, FOLLOW) * (travel - self.floor)
-
-    def speed(self, travel: float, most: float, slope: float) -> float:
-        """Return the speed v_a of the approach, at most ``most`` [m/s], with the slope k [1/s]."""
-        return min(max(slope * (self.floor + self.reach - travel), -most), most)
 
 
 class Contact:
@@ -107,16 +42,34 @@ class Contact:
         return self.task.sense(robot, t).confidence
 
 
+class HardContact(Contact):
+    """The switch that a contact replaces: on from the force ``on``, off below ``off``, all or nothing.
+
+    For comparisons. It makes the confidence of the force task 0 or 1 as well.
+    """
+
+    _on = False
+
+    def __call__(self, robot: Robot, t: float) -> float:
+        """Evaluate the activation at the robot's present state."""
+        touch = self.task.sense(robot, t)
+        pressed = float(np.linalg.norm(touch.measured))
+        off, on = self.task.thresholds
+        self._on = pressed > (off if self._on else on)
+        self.task.memory[CONFIDENCE] = float(self._on)
+        return float(self._on)
+
+
 class GiveWay:
     """A position in time that follows the tool along the force while something is pressed.
 
     For a position task below a force task, which does not decide there how far in the tool is. With n
     along the force and c the confidence of the touch, the reference p is shifted by δ n,
 
-        δ̇ = −c nᵀ ṗ + c (nᵀ (x − p) − δ)/τ,        τ = `FOLLOW`
+        δ̇ = −c nᵀ ṗ + c (nᵀ (x − p) − δ)/τ,        τ = `opspace.law.scalars.FOLLOW`
 
-    so that it is where the tool is when the touch ends. Like the force task it remembers; asked again
-    at the same time it answers the same.
+    so that it is where the tool is when the touch ends. It goes by what the force task knew in the
+    tick before, like which it remembers; asked again at the same time it answers the same.
 
     Args:
         reference: (3,) m, or a reference of a position.
@@ -126,8 +79,10 @@ class GiveWay:
     def __init__(self, reference: ArrayLike | Reference, task: ForceTask) -> None:
         self.reference: Reference = reference if callable(reference) else Constant(reference)
         self.task = task
-        self._t: float | None = None
+        self._t = -math.inf
         self._shift = 0.0
+        self._before: Array | None = None
+        self._now: Array | None = None
 
     def begin_at(self, t: float) -> GiveWay:
         """Return this reference with nothing to be followed yet, begun at time t, s."""
@@ -136,22 +91,25 @@ class GiveWay:
     def __call__(self, t: float, /) -> Sample:
         """Return the desired motion at time t, s."""
         x, v, a = self.reference(t)
-        touch = self.task.touch
-        if touch is None:
+        known = self.task.memory.before(t)
+        if known is None:
             return Sample(x, v, a)
-        before, self._t = self._t, t
-        dt = 0.0 if before is None else t - before
-        n, c = touch.direction, touch.confidence
-        if 0.0 < dt <= LONGEST:
+        c, travel, n = known
+        dt = passed(t, self._t)
+        if t != self._t:
+            self._t, self._before, self._now = t, self._now, x
+        if dt > 0.0 and self._before is not None:
             ahead = float(n @ v) if v.size else 0.0
-            away = touch.travel - float(n @ x) - self._shift
+            away = travel - float(n @ self._before) - self._shift
             self._shift += c * (lag(dt, FOLLOW) * away - dt * ahead)
         v = v - c * (n @ v) * n if v.size else v
         return Sample(x + self._shift * n, v, a - c * (n @ a) * n if a.size else a)
 
 
-def checked_thresholds(contact: tuple[float, float] | None, force: float, name: str) -> Confidence:
-    """Make the confidence of a task that presses with ``force`` [N].
+def checked_thresholds(
+    contact: tuple[float, float] | None, force: float, name: str
+) -> tuple[float, float]:
+    """Tell between which forces [N] the confidence of a task rises that presses with ``force`` [N].
 
     Args:
         contact: Forces (off, on) between which the confidence rises, N; None is a tenth and four
@@ -164,7 +122,7 @@ def checked_thresholds(contact: tuple[float, float] | None, force: float, name: 
             other half-way, with a confidence between 0 and 1.
     """
     if contact is None:
-        return Confidence(0.1 * force, 0.4 * force)
+        return 0.1 * force, 0.4 * force
     off, on = contact
     if not (math.isfinite(off) and math.isfinite(on) and 0.0 < off < on):
         raise InputError(
@@ -175,4 +133,4 @@ def checked_thresholds(contact: tuple[float, float] | None, force: float, name: 
             f"task {name!r}: a force of {force:g} N is below contact[1] = {on:g} N, so that the task "
             "could come to rest half-way between motion and force; press harder or lower contact"
         )
-    return Confidence(off, on)
+    return float(off), float(on)

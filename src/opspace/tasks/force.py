@@ -4,67 +4,24 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from opspace.errors import InputError
-from opspace.tasks.contact import LONGEST, Confidence, Reach, checked_thresholds, lag
+from opspace.law import press_columns as at
+from opspace.law import scalars
+from opspace.tasks.contact import checked_thresholds
 from opspace.tasks.motion_task import AxesFrame, axes_selection
 from opspace.tasks.motions import Motion, WorldFrame, as_offset
+from opspace.tasks.rotation import cross
 from opspace.tasks.task import Task, TaskTerms
+from opspace.tasks.touch_memory import Touch, TouchMemory
 from opspace.tasks.validation import Array, finite, finite_array, positive
 
 if TYPE_CHECKING:
     from opspace.robots.protocol import Robot
-
-FILTER = 0.003
-"""Time constant of the measured wrench, s."""
-FRICTION_FILTER = 0.03
-"""Time constant of the force along the surface that is fed through, s: where the tool sticks this is a
-loop, and the lag is what keeps it slow."""
-UNLOAD = 0.1
-"""Time constant with which the integral empties out of contact, s."""
-STALE_AFTER = 0.01
-"""Without a new wrench for so long, what was measured last counts for nothing any more, s."""
-LEVER = 0.1
-"""Moment that counts like a force, per N: bounds of the integral of moment rows, m."""
-
-
-class Touch(NamedTuple):
-    """What a force task knows of its contact in one tick.
-
-    Attributes:
-        confidence: c, how sure it is that something is touched, 0 to 1.
-        measured: (m,) wrench on the environment along the rows, filtered, N and N·m.
-        commanded: (m,) wrench that is commanded there, N and N·m.
-        sigma: J A⁻¹ Jᵀ along the force, one over the mass that moves, 1/kg.
-        speed: Speed of the approach along the force, m/s.
-        direction: (3,) where the force points, in world axes.
-        travel: How far the point is along it, m.
-    """
-
-    confidence: float
-    measured: Array
-    commanded: Array
-    sigma: float
-    speed: float
-    direction: Array
-    travel: float
-
-
-@dataclass
-class _Memory:
-    """What is remembered from tick to tick."""
-
-    t: float
-    integral: Array
-    force: Array
-    wrench: Array
-    along: Array
-    touch: Touch
 
 
 class ForceTask(Task):
@@ -77,8 +34,9 @@ class ForceTask(Task):
         f*  = kv ((1 − c) v_a − ẋ)           speed: the approach in the air, none in contact
         g   = c (Jᵀ F + J_tᵀ F_t)            torque that is balanced by the reaction
 
-    where c is the confidence that something is touched (`opspace.tasks.contact.Confidence`), v_a the
-    speed of the approach along the force and F_t the measured force along the surface. The speed v_a
+    where c is the confidence that something is touched (`opspace.law.scalars.confidence`), v_a the
+    speed of the approach along the force and F_t the measured force along the surface, which turns with
+    the direction of sliding. The speed v_a
     is at most σ |F_d| / kv with σ = J A⁻¹ Jᵀ: with that the arm pushes with F_d at standstill whatever
     c is.
     When the touch is lost the tool follows the surface by ``reach`` and stops there.
@@ -164,11 +122,8 @@ class ForceTask(Task):
         self.force_rate = positive(force_rate, f"task {name!r}: force_rate")
         self.friction = bool(friction)
         self._thresholds = contact
-        self._reach = Reach(positive(reach, f"task {name!r}: reach"))
-        self._confidence = Confidence(0.0, 1.0)
-        self._memory: _Memory | None = None
-        self._wrench: tuple[float, Array] | None = None
-        self._frozen = False
+        self.reach = positive(reach, f"task {name!r}: reach")
+        self.memory = TouchMemory(rows)
         self._tool = ""
         self._wanted = np.zeros(rows)
         self._set_wanted(
@@ -204,6 +159,21 @@ class ForceTask(Task):
         self._change_gains(finite(value, f"task {self.name!r}: kp"), self._ki)
 
     @property
+    def kv(self) -> float | Array:
+        """Damping, 1/s: a number or (m,)."""
+        return super().kv
+
+    @kv.setter
+    def kv(self, value: ArrayLike | None) -> None:
+        before = self._gains
+        self._set_gains(0.0, value, None)
+        try:
+            self._check_gains()
+        except InputError:
+            self._gains = before
+            raise
+
+    @property
     def ki(self) -> float:
         """Integral gain on the force, 1/s."""
         return self._ki
@@ -234,7 +204,17 @@ class ForceTask(Task):
     @property
     def touch(self) -> Touch | None:
         """What it knew of its contact in the last tick; None before the first."""
-        return None if self._memory is None else self._memory.touch
+        return self.memory.touch
+
+    @property
+    def wanted(self) -> Array:
+        """(m,) force and moment of every row, N and N·m."""
+        return self._wanted.copy()
+
+    @property
+    def thresholds(self) -> tuple[float, float]:
+        """Forces (off, on) between which the confidence rises, N."""
+        return self._between
 
     def bind(self, robot: Robot) -> None:
         """Look up the frame."""
@@ -243,16 +223,11 @@ class ForceTask(Task):
 
     def reset(self) -> None:
         """Begin without contact."""
-        self._memory = None
-        self._confidence.value = 0.0
-        self._reach.floor = math.inf
+        self.memory.forget()
 
     def resume(self, pause: float) -> None:
         """Keep what is known of the contact: an arm that presses goes on pressing."""
-        if self._memory is not None:
-            self._memory.t += pause
-        if self._wrench is not None:
-            self._wrench = self._wrench[0] + pause, self._wrench[1]
+        self.memory.wait(pause)
 
     def take(self, t: float, wrench: Array | None) -> bool:
         """Be told the wrench on the environment at time ``t`` [s].
@@ -266,21 +241,18 @@ class ForceTask(Task):
             Whether it is fresh enough to be used.
         """
         if wrench is not None:
-            self._wrench = t, wrench
-        return self._fresh(t)
+            self.memory.take(t, wrench)
+            return True
+        return scalars.is_fresh(t - self.memory[at.GIVEN_AT])
 
     @property
     def measured_once(self) -> bool:
         """Whether it has ever been told a wrench."""
-        return self._wrench is not None
-
-    def _fresh(self, t: float) -> bool:
-        # Times are sums of floating-point numbers: a millionth more is no time.
-        return self._wrench is not None and t - self._wrench[0] <= STALE_AFTER * (1.0 + 1e-6)
+        return self.memory[at.GIVEN_AT] > -math.inf
 
     def freeze(self, frozen: bool) -> None:
         """Keep the integral where it is from the next tick on, or let it go on."""
-        self._frozen = frozen
+        self.memory[at.FROZEN] = frozen
 
     def sense(self, robot: Robot, t: float) -> Touch:
         """Learn from the wrench of this tick; asked again at the same time it answers the same.
@@ -289,31 +261,31 @@ class ForceTask(Task):
             robot: The robot at the present state.
             t: Time, s.
         """
-        memory = self._memory
-        if memory is not None and memory.t == t:
-            return memory.touch
-        motion = self.source.measure(robot)
-        return self._learn(robot, t, motion, self._axes(motion)).touch
+        if not self._knows(t):
+            motion = self.source.measure(robot)
+            self._learn(robot, t, motion, self._axes(motion))
+        touch = self.memory.touch
+        assert touch is not None
+        return touch
 
     def evaluate(self, robot: Robot, t: float) -> TaskTerms:
         """Return the terms of the task at the robot's present state."""
         motion = self.source.measure(robot)
         axes = self._axes(motion)
-        memory = self._memory
-        if memory is None or memory.t != t:
-            memory = self._learn(robot, t, motion, axes)
-        touch = memory.touch
-        c, direction = touch.confidence, self._direction(memory.force)
-        ahead = (1.0 - c) * touch.speed * direction
+        if not self._knows(t):
+            self._learn(robot, t, motion, axes)
+        memory = self.memory
+        c, force = memory[at.CONFIDENCE], memory.part(at.PUSH)
+        ahead = (1.0 - c) * memory[at.SPEED] * self._direction(force)
         J = axes @ motion.J
-        torque = J.T @ touch.commanded
+        torque = J.T @ memory.part(at.COMMANDED)
         if self.friction:
-            torque += motion.J[:3].T @ memory.along
+            torque += motion.J[:3].T @ memory.part(at.ALONG, 3)
         return TaskTerms(
             J=J,
             drift=axes @ motion.drift,
             acceleration=self._gains.kv * (ahead - axes @ motion.velocity),
-            error=memory.force - touch.measured,
+            error=force - memory.part(at.MEASURED),
             torque=c * torque,
         )
 
@@ -321,65 +293,98 @@ class ForceTask(Task):
         """See `Task.row_axes`."""
         return self._axes(self.source.measure(robot))
 
-    def _learn(self, robot: Robot, t: float, motion: Motion, axes: Array) -> _Memory:
-        """Bring confidence, integral, friction and approach up to time t."""
-        wrench = np.zeros(6) if self._wrench is None else self._wrench[1]
-        memory = self._memory
-        if memory is None:
-            memory = _Memory(
-                t,
-                np.zeros(self.rows),
-                self._wanted.copy(),
-                wrench.copy(),
-                np.zeros(3),
-                Touch(0.0, np.zeros(self.rows), np.zeros(self.rows), 0.0, 0.0, np.zeros(3), 0.0),
-            )
-            self._memory = memory
-        dt = t - memory.t
-        dt = dt if 0.0 < dt <= LONGEST else 0.0
-        memory.t = t
-        step = self._scale * self.force_rate * dt
-        memory.force = memory.force + np.clip(self._wanted - memory.force, -step, step)
-        measured = axes @ memory.wrench
-        if self._fresh(t):
-            memory.wrench = memory.wrench + lag(dt, FILTER) * (wrench - memory.wrench)
-            measured = axes @ memory.wrench
-            self._integrate(memory, axes, measured, dt)
-        direction = self._direction(memory.force)
-        A = np.linalg.solve(robot.M, motion.J.T @ (axes.T @ direction))
-        sigma = float(direction @ (axes @ (motion.J @ A)))
-        size = float(np.linalg.norm(memory.force[: self.forces]))
-        most = min(self.approach_speed, sigma * size / float(np.max(self._gains.kv)))
-        ahead = (axes.T @ direction)[:3]
-        travel = float(ahead @ motion.position)
-        c = self._confidence.value
-        slope = 0.25 * float(np.min(self._gains.kv))  # critically damped
-        self._reach.learn(travel, c, most / slope, dt)
-        memory.touch = Touch(
-            c,
-            measured,
-            memory.force + self._kp * (memory.force - measured) + memory.integral,
-            sigma,
-            self._reach.speed(travel, most, slope),
-            ahead,
-            travel,
-        )
-        return memory
+    def _knows(self, t: float) -> bool:
+        """Tell whether it has learnt from the tick at time t."""
+        return self.memory[at.BEGUN] != 0.0 and self.memory[at.WHEN] == t
 
-    def _integrate(self, memory: _Memory, axes: Array, measured: Array, dt: float) -> None:
-        pressed = float(self._direction(memory.force) @ measured)
-        c = self._confidence.learn(pressed, dt)
-        along = memory.wrench[:3] - axes[:, :3].T @ (axes[:, :3] @ memory.wrench[:3])
-        memory.along = memory.along + lag(dt, FRICTION_FILTER) * (along - memory.along)
-        if self._frozen:
-            return
-        # An impact of many times the force, of a few milliseconds, must not unwind the integral.
-        most = np.where(memory.force == 0.0, self._bound, np.abs(memory.force))
-        grown = c * self._ki * np.clip(memory.force - measured, -most, most)
-        emptied = (1.0 - c) / UNLOAD * memory.integral
-        memory.integral = np.clip(
-            memory.integral + dt * (grown - emptied), -self._bound, self._bound
+    def _learn(self, robot: Robot, t: float, motion: Motion, axes: Array) -> None:
+        """Bring confidence, integral, friction and approach up to time t."""
+        memory = self.memory
+        dt = self._begin(t)
+        force, wrench = memory.part(at.PUSH), memory.part(at.WRENCH, 6)
+        step = self._scale * self.force_rate * dt
+        force += np.clip(self._wanted - force, -step, step)
+        fresh = scalars.is_fresh(t - memory[at.GIVEN_AT])
+        memory[at.FRESH] = fresh
+        if fresh:
+            given = memory.part(at.GIVEN, 6)
+            wrench += scalars.lag(dt, scalars.WRENCH_FILTER) * (given - wrench)
+            self._feel(axes, axes @ wrench, dt)
+            self._rub(axes, motion.velocity[:3], dt)
+        measured = axes @ wrench
+        memory.part(at.MEASURED)[:] = measured
+        memory.part(at.COMMANDED)[:] = (
+            force + self._kp * (force - measured) + memory.part(at.INTEGRAL)
         )
+        self._approach(robot, motion, axes, dt)
+
+    def _begin(self, t: float) -> float:
+        """Begin the tick at time t; how long after the one before, s."""
+        memory = self.memory
+        if memory[at.BEGUN]:
+            dt = scalars.passed(t, memory[at.WHEN])
+            memory[at.EARLIER] = memory[at.CONFIDENCE]
+            memory[at.EARLIER_TRAVEL] = memory[at.TRAVEL]
+            memory.part(at.EARLIER_AHEAD, 3)[:] = memory.part(at.AHEAD, 3)
+        else:
+            dt = 0.0
+            memory.part(at.EARLIER, at.GIVEN - at.EARLIER)[:] = 0.0
+            memory.part(at.INTEGRAL)[:] = 0.0
+            memory.part(at.PUSH)[:] = self._wanted
+            memory.part(at.WRENCH, 6)[:] = memory.part(at.GIVEN, 6)
+            memory.part(at.ALONG, 3)[:] = memory.part(at.SLIDING, 3)[:] = 0.0
+            memory[at.BEGUN] = 1.0
+        memory[at.WHEN], memory[at.PASSED] = t, dt
+        return dt
+
+    def _feel(self, axes: Array, measured: Array, dt: float) -> None:
+        """Learn confidence and integral from the filtered wrench."""
+        memory = self.memory
+        force = memory.part(at.PUSH)
+        pressed = float(self._direction(force) @ measured)
+        c = scalars.confidence(memory[at.CONFIDENCE], pressed, *self._between, dt)
+        memory[at.CONFIDENCE] = c
+        if memory[at.FROZEN]:
+            return
+        integral = memory.part(at.INTEGRAL)
+        for i, bound in enumerate(self._bound):
+            missing = float(force[i] - measured[i])
+            integral[i] = scalars.integral_after(
+                float(integral[i]), missing, float(force[i]), float(bound), self._ki, c, dt
+            )
+
+    def _rub(self, axes: Array, velocity: Array, dt: float) -> None:
+        """Learn the force along the surface, which turns with the direction u of sliding.
+
+        Ḟ_t = (u × u̇) × F_t + (F − F_t)/τ,  u = v/√(v² + v₀²): what lags is its size alone.
+        """
+        memory = self.memory
+        wrench, along = memory.part(at.WRENCH, 3), memory.part(at.ALONG, 3)
+        sliding, n = memory.part(at.SLIDING, 3), axes[:, :3]
+        u = velocity - n.T @ (n @ velocity)
+        u = u / math.sqrt(float(u @ u) + scalars.SLIDING_SPEED**2)
+        if dt > 0.0:
+            along += cross(cross(sliding, u), along)
+        sliding[:] = u
+        now = wrench - n.T @ (n @ wrench)
+        along += scalars.lag(dt, scalars.FRICTION_FILTER) * (now - along)
+
+    def _approach(self, robot: Robot, motion: Motion, axes: Array, dt: float) -> None:
+        """Find how fast it may come, and how far."""
+        memory = self.memory
+        force = memory.part(at.PUSH)
+        direction = self._direction(force)
+        ahead = axes.T @ direction
+        row = ahead @ motion.J
+        sigma = float(row @ np.linalg.solve(robot.M, row))
+        size = float(np.linalg.norm(force[: self.forces]))
+        most = min(self.approach_speed, sigma * size / float(np.max(self._gains.kv)))
+        slope = 0.25 * float(np.min(self._gains.kv))  # critically damped
+        travel, c = float(ahead[:3] @ motion.position), memory[at.CONFIDENCE]
+        floor = scalars.floor_of(memory[at.FLOOR], travel, c, most / slope, dt)
+        memory[at.SIGMA], memory[at.FLOOR], memory[at.TRAVEL] = sigma, floor, travel
+        memory[at.SPEED] = scalars.approach(floor, self.reach, travel, most, slope)
+        memory.part(at.AHEAD, 3)[:] = ahead[:3]
 
     def _axes(self, motion: Motion) -> Array:
         """Return the rows (m, 6) in world axes."""
@@ -400,7 +405,7 @@ class ForceTask(Task):
     @property
     def _scale(self) -> Array:
         """What counts like 1 N in each row."""
-        return np.where(np.arange(self.rows) < self.forces, 1.0, LEVER)
+        return np.where(np.arange(self.rows) < self.forces, 1.0, scalars.LEVER)
 
     @property
     def _bound(self) -> Array:
@@ -413,8 +418,7 @@ class ForceTask(Task):
                 f"task {self.name!r}: a force of zero cannot tell whether it touches; an "
                 "ImpedanceTask gives way without pressing"
             )
-        thresholds = checked_thresholds(self._thresholds, size, self.name)
-        self._confidence.off, self._confidence.on = thresholds.off, thresholds.on
+        self._between = checked_thresholds(self._thresholds, size, self.name)
         self._wanted = np.concatenate([force, moment])
 
     def _change_gains(self, kp: float, ki: float) -> None:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from opspace.errors import InputError
+from opspace.law.scalars import LIGHTEST
 from opspace.tasks.motion_task import AxesFrame, MotionTask
 from opspace.tasks.motions import WorldFrame, as_offset
 from opspace.tasks.quantities import Pose, Position
@@ -17,9 +18,6 @@ from opspace.tasks.validation import Array, finite_array
 
 if TYPE_CHECKING:
     from opspace.robots.protocol import Robot
-
-LIGHTEST = 1e-9
-"""A row that moves less than this mass in the inverse needs no damping of its own, 1/kg."""
 
 
 class ImpedanceTask(MotionTask):

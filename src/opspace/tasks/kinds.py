@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Literal, NamedTuple
 
-from opspace.tasks.tracking import TrackingTask
+from opspace.tasks.task import Task
 
 
 class TaskKind(NamedTuple):
@@ -13,8 +13,10 @@ class TaskKind(NamedTuple):
     Attributes:
         task: Its class.
         controls: What a target is a value of; it says which targets a scenario can give, in which
-            unit speeds are, and how many rows there are.
+            unit speeds are, and how many rows there are. Forces have no target.
+        sprung: Whether it has gains of its own in place of kp and kv.
     """
 
-    task: type[TrackingTask]
-    controls: Literal["position", "orientation", "pose", "joint", "joints"]
+    task: type[Task]
+    controls: Literal["position", "orientation", "pose", "joint", "joints", "force"]
+    sprung: bool = False

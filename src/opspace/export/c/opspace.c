@@ -26,7 +26,7 @@ struct opspace {
     uint64_t *words;
     void *handle;
     double *q, *v, *tau, *M, *bias, *torque_limit, *option;
-    double *gravity, *variable, *own, *numbers, *goal, *kp, *kv;
+    double *gravity, *variable, *own, *numbers, *goal, *kp, *kv, *press;
     int64_t *kind, *endless;
     double before;
     int begun;
@@ -77,6 +77,7 @@ static void find_fields(opspace *c)
     c->goal = memory_of(c, "goal");
     c->kp = memory_of(c, "kp");
     c->kv = memory_of(c, "kv");
+    c->press = memory_of(c, "press");
     c->kind = memory_of(c, "kind");
     c->endless = memory_of(c, "endless");
 }
@@ -168,11 +169,30 @@ static void without_gravity(const opspace *c, double *tau)
             tau[i] -= c->gravity[i];
 }
 
+/* What a force task remembers; NULL of another task. */
+static double *press_of(const opspace *c, int task)
+{
+    const int64_t *kind = c->kind + task * KIND_SIZE;
+    return kind[KIND_KIND] == KIND_FORCE ? c->press + kind[KIND_PRESS] * PRESS_SIZE : NULL;
+}
+
+static int all_measured(const opspace *c)
+{
+    for (int i = 0; i < c->model->tasks; i++) {
+        const double *row = press_of(c, i);
+        if (row && !isfinite(row[PRESS_GIVEN_AT]))
+            return 0;
+    }
+    return 1;
+}
+
 int64_t opspace_step(opspace *c, double t, const double *q, const double *v, double *tau)
 {
     const opspace_model *m = c->model;
     if (!isfinite(t) || !all_finite(q, m->nq) || !all_finite(v, m->n))
         return OPSPACE_NOT_FINITE;
+    if (!all_measured(c))
+        return OPSPACE_NO_WRENCH;
     int64_t timing = watch(c, t, q, v);
     c->before = t;
     c->begun = 1;
@@ -256,7 +276,7 @@ int opspace_set_target(
         return OPSPACE_NO_TASK;
     int size = one->joints ? one->joints : (one->position ? 3 : 0) + (one->orientation ? 3 : 0);
     int given = one->joints + one->position + one->orientation;
-    if (!all_finite(x, given) || !finite_or_none(velocity, size) || !finite_or_none(acceleration, size))
+    if (given == 0 || !all_finite(x, given) || !finite_or_none(velocity, size) || !finite_or_none(acceleration, size))
         return OPSPACE_REFUSED;
     int64_t *kind = c->kind + task * KIND_SIZE;
     if (one->joints) {
@@ -291,11 +311,43 @@ int opspace_set_gains(opspace *c, int task, const double *kp, const double *kv)
     const opspace_task *one = task_at(c, task);
     if (!one)
         return OPSPACE_NO_TASK;
+    const double *row = press_of(c, task);
+    for (int i = 0; i < one->rows; i++)
+        if (row && (kp[i] != 0.0 || !(row[PRESS_KI] <= 0.5 * kv[i] * (1.0 + row[PRESS_KP]))))
+            return OPSPACE_REFUSED;
     for (int i = 0; i < one->rows; i++)
         if (!isfinite(kp[i]) || !isfinite(kv[i]) || kp[i] < 0.0 || kv[i] < 0.0)
             return OPSPACE_REFUSED;
     copy(c->kp + one->first_row, kp, one->rows);
     copy(c->kv + one->first_row, kv, one->rows);
+    return 0;
+}
+
+int opspace_set_wrench(opspace *c, int task, double t, const double *wrench)
+{
+    if (!task_at(c, task))
+        return OPSPACE_NO_TASK;
+    double *row = press_of(c, task);
+    if (!row || !isfinite(t) || !all_finite(wrench, 6))
+        return OPSPACE_REFUSED;
+    copy(row + PRESS_GIVEN, wrench, 6);
+    row[PRESS_GIVEN_AT] = t;
+    return 0;
+}
+
+int opspace_set_force(opspace *c, int task, const double *force)
+{
+    const opspace_task *one = task_at(c, task);
+    if (!one)
+        return OPSPACE_NO_TASK;
+    double *row = press_of(c, task), size = 0.0;
+    if (!row || !all_finite(force, one->rows))
+        return OPSPACE_REFUSED;
+    for (int i = 0; i < (int)row[PRESS_FORCES]; i++)
+        size += force[i] * force[i];
+    if (sqrt(size) < row[PRESS_ON])
+        return OPSPACE_REFUSED;
+    copy(row + PRESS_WANTED, force, one->rows);
     return 0;
 }
 

@@ -75,7 +75,8 @@ void opspace_close(opspace *controller);
  * Where the robot adds the torque against gravity, tau is what it adds that to.
  * Returns what happened, a sum of OPSPACE_ statuses, 0 in an ordinary tick. With OPSPACE_FAULT tau is
  * the torque against the bias with joint damping. OPSPACE_NOT_FINITE, negative: time or state is not
- * finite, and tau is as it was. */
+ * finite, and tau is as it was; nor does it change with OPSPACE_NO_WRENCH, a force task that has never
+ * been given one. */
 int64_t opspace_step(opspace *controller, double t, const double *q, const double *v, double *tau);
 
 /* Number of a task, or OPSPACE_NO_TASK. */
@@ -92,8 +93,23 @@ int opspace_set_target(
 
 /* Change the gains of a task: kp in 1/s^2 and kv in 1/s, one for each of its rows.
  *
- * Returns 0, OPSPACE_NO_TASK or OPSPACE_REFUSED: a gain is negative or not finite. */
+ * A force task has no kp, and its kv is at least twice its integral gain. Returns 0, OPSPACE_NO_TASK or
+ * OPSPACE_REFUSED: a gain is negative or not finite, or is no force task's. */
 int opspace_set_gains(opspace *controller, int task, const double *kp, const double *kv);
+
+/* Give a force task the wrench that the robot exerts on the environment, measured at time t.
+ *
+ * wrench is 3 N and 3 N*m in world axes at the point of the task. No step is made before every force
+ * task has had one; after 10 ms without a new one the status says OPSPACE_WRENCH_STALE. Returns 0,
+ * OPSPACE_NO_TASK or OPSPACE_REFUSED: no force task, or a number that is not finite. */
+int opspace_set_wrench(opspace *controller, int task, double t, const double *wrench);
+
+/* Change what a force task presses with, one number for each of its rows, N then N*m.
+ *
+ * It is approached at the rate that the task was exported with. Returns 0, OPSPACE_NO_TASK or
+ * OPSPACE_REFUSED: no force task, a number is not finite, or the force is below the one at which the
+ * task is sure of its contact. */
+int opspace_set_force(opspace *controller, int task, const double *force);
 
 /* Let a task come (present is 1) or go (0) from time t on, for so many seconds.
  *
