@@ -12,7 +12,7 @@ import numpy as np
 from opspace.command import Distance
 from opspace.robots.protocol import Robot
 from opspace.robots.shapes import LinkCapsule
-from opspace.tasks.obstacles import Obstacle
+from opspace.tasks.obstacles import Obstacle, Placing
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,6 +48,14 @@ class DistanceLayout:
     rows: np.ndarray
     pairs: tuple[str, ...]
     pair: np.ndarray
+
+    def placings(self, t: float) -> tuple[Placing, ...]:
+        """Ask every obstacle where it is at time t, s."""
+        return tuple(obstacle.placing(t) for obstacle in self.obstacles)
+
+    def by_name(self, placings: Sequence[Placing]) -> dict[str, Placing]:
+        """Give what `placings` tells the names of the obstacles."""
+        return {o.name: placing for o, placing in zip(self.obstacles, placings, strict=True)}
 
     def status(self, distance: np.ndarray, taken: np.ndarray) -> dict[str, Distance]:
         """Tell of every pair of bodies how near it is and how much it acts, the nearest first.
