@@ -200,6 +200,7 @@ class Which(str, Enum):
 
     SINGULARITY = "singularity"
     JOINT_LIMIT = "joint-limit"
+    COLLISIONS = "collisions"
     ALL = "all"
 
 
@@ -207,11 +208,19 @@ class Which(str, Enum):
 def reproduce(
     which: Annotated[Which, typer.Argument(help="The experiment.")] = Which.ALL,
     robot: Annotated[
-        str, typer.Option(help="Name of a robot, or path of a .urdf or .xml file.")
-    ] = "puma560",
+        str | None, typer.Option(help="Name of a robot, or path of a .urdf or .xml file; puma560.")
+    ] = None,
     out: Annotated[Path, typer.Option(help="Directory to write to.")] = Path("results"),
 ) -> None:
-    """Repeat the paper's experiments: without the method, with a hard switch, and with it."""
+    """Repeat the paper's experiments: without the method, with a hard switch, and with it.
+
+    ``collisions``, minutes long and not part of ``all``, are five scenes of a Panda that would touch
+    something, in five ways.
+    """
+    if which is Which.COLLISIONS:
+        _reproduce_collisions(robot, out)
+        return
+    robot = robot or "puma560"
     from opspace.runs.progress import ProgressBar
     from opspace.runs.reproduce import EXPERIMENTS, draw, reproduce
     from opspace.runs.tables import metrics_table
@@ -223,6 +232,26 @@ def reproduce(
         print(f"\n{found.experiment.name}: {found.experiment.title}")
         _print_table(*metrics_table({name: run.metrics for name, run in found.runs.items()}))
     for problem in draw(done, out):
+        print(problem, file=sys.stderr)
+    print(f"results: {out}")
+
+
+def _reproduce_collisions(robot: str | None, out: Path) -> None:
+    from opspace.compare.collision_experiment import (
+        collisions_table,
+        draw_collisions,
+        reproduce_collisions,
+    )
+    from opspace.errors import InputError
+    from opspace.runs.progress import ProgressBar
+
+    if robot not in (None, "panda"):
+        raise InputError(f"the scenes of collisions are those of a panda, not of {robot!r}")
+    out = out / "collisions"
+    with ProgressBar() as progress:
+        done = reproduce_collisions(out, progress=progress)
+    _print_table(*collisions_table(done))
+    for problem in draw_collisions(done, out):
         print(problem, file=sys.stderr)
     print(f"results: {out}")
 

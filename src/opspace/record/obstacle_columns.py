@@ -156,14 +156,23 @@ def recorded_placings(recording: Recording) -> list[Mapping[str, Placing]] | Non
         for column in recording.columns
         if column.name.startswith(f"{GROUP}/") and column.name.endswith(last)
     ]
-    by_name = {
-        name: np.column_stack([recording[f"{GROUP}/{name}/{part}"] for part in PARTS])
-        for name in names
-    }
+    by_name = {name: row_columns(recording, name) for name in names}
     return [
-        {name: placing_of(x[i]) for name, x in by_name.items() if not np.isnan(x[i, 0])}
+        {
+            name: placing_of(x[i])
+            for name, x in by_name.items()
+            if x is not None and not np.isnan(x[i, 0])
+        }
         for i in range(len(recording))
     ]
+
+
+def row_columns(recording: Recording, name: str) -> np.ndarray | None:
+    """Read the columns of an obstacle, (T, parts); None where none of that name was recorded."""
+    columns = [f"{GROUP}/{name}/{part}" for part in PARTS]
+    if columns[0] not in recording:
+        return None
+    return np.column_stack([recording[column] for column in columns])
 
 
 def placing_of(numbers: np.ndarray) -> Placing:
