@@ -437,6 +437,35 @@ def check(
         print(f"warning: {warning}")
 
 
+@app.command(epilog="Example: opspace shapes panda --out panda-shapes.yaml")
+def shapes(
+    robot: Annotated[str, typer.Argument(help="Name of a robot, or path of a .urdf or .xml file.")],
+    margin: Annotated[float, typer.Option(help="Distance that is to be kept, m.")] = 0.01,
+    srdf: Annotated[
+        Path | None, typer.Option(help="SRDF file with the pairs of links to leave out.")
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="File to write, .yaml; CollisionAvoidance reads it back.")
+    ] = None,
+) -> None:
+    """Fit capsules to the links of a robot, and tell which pairs are kept apart and why others not."""
+    from opspace.robots import load_robot
+    from opspace.robots.shape_file import write_shapes
+    from opspace.runs.shapes_report import pairs_table, shapes_table
+    from opspace.tasks import CollisionAvoidance
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ModelWarning)  # opspace check tells them
+        found = load_robot(robot)
+    guard = CollisionAvoidance(margin=margin, pairs="auto" if srdf is None else srdf)
+    guard.bind(found)
+    _print_table(*shapes_table(guard.shapes))
+    print()
+    _print_table(*pairs_table(guard))
+    if out is not None:
+        print(f"results: {write_shapes(out, found.name, margin, guard.shapes, guard.chosen)}")
+
+
 def _position(text: str) -> tuple[str, float | None]:
     """Read NAME or NAME=POSITION."""
     name, given, position = text.partition("=")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import combinations
 from typing import NamedTuple
 
@@ -34,7 +34,12 @@ class Pairs(NamedTuple):
     left_out: dict[tuple[str, str], str]
 
 
-def pairs_of(robot: Robot, shapes: Sequence[LinkCapsule], margin: float) -> Pairs:
+def pairs_of(
+    robot: Robot,
+    shapes: Sequence[LinkCapsule],
+    margin: float,
+    disabled: Mapping[frozenset[str], str] | None = None,
+) -> Pairs:
     """Choose the pairs of links that can collide and do not always.
 
     Left out are links with at most one joint between them, links that are nearer than the margin in the
@@ -45,6 +50,8 @@ def pairs_of(robot: Robot, shapes: Sequence[LinkCapsule], margin: float) -> Pair
         robot: The robot; it is not changed.
         shapes: Its capsules.
         margin: Distance that is to be kept, m.
+        disabled: Pairs that somebody has chosen to leave out, with reasons; then random postures
+            leave out none.
 
     Returns:
         The pairs.
@@ -58,6 +65,9 @@ def pairs_of(robot: Robot, shapes: Sequence[LinkCapsule], margin: float) -> Pair
         if len(moved[one] ^ moved[two]) <= 1:
             left_out[one, two] = "at most one joint between them"
             continue
+        if disabled is not None and (why := disabled.get(frozenset((one, two)))):
+            left_out[one, two] = f"disabled: {why}"
+            continue
         gap = np.min(
             [
                 segment_distance(placed[i], placed[j]) - shapes[i].radius - shapes[j].radius
@@ -67,7 +77,7 @@ def pairs_of(robot: Robot, shapes: Sequence[LinkCapsule], margin: float) -> Pair
             ],
             axis=0,
         )
-        reason = _reason(gap, margin)
+        reason = _near(gap, margin) if disabled is not None else _reason(gap, margin)
         if reason:
             left_out[one, two] = reason
         else:
@@ -78,11 +88,15 @@ def pairs_of(robot: Robot, shapes: Sequence[LinkCapsule], margin: float) -> Pair
 def _reason(gap: np.ndarray, margin: float) -> str:
     if np.mean(gap < 0.0) > ALWAYS:
         return f"they overlap in {100.0 * np.mean(gap < 0.0):.0f} % of all postures"
-    if gap[0] < margin:
-        return f"{1e3 * gap[0]:.0f} mm apart in the reference posture"
+    if near := _near(gap, margin):
+        return near
     if np.min(gap) > NEAR + margin:
         return f"never nearer than {1e3 * np.min(gap):.0f} mm"
     return ""
+
+
+def _near(gap: np.ndarray, margin: float) -> str:
+    return f"{1e3 * gap[0]:.0f} mm apart in the reference posture" if gap[0] < margin else ""
 
 
 def _placed(robot: Robot, shapes: Sequence[LinkCapsule]) -> np.ndarray:
@@ -94,7 +108,7 @@ def _placed(robot: Robot, shapes: Sequence[LinkCapsule]) -> np.ndarray:
     rng = np.random.default_rng(0)
     reach = np.minimum(robot.q_upper - robot.q_lower, 2.0 * math.pi)
     middle = np.where(np.isfinite(robot.q_lower), robot.q_lower, -math.pi) + 0.5 * reach
-    single = robot.actuated & np.isfinite(robot.q_lower + robot.q_upper)
+    single = robot.actuated & np.isfinite(robot.q_lower) & np.isfinite(robot.q_upper)
     straight = robot.nq == robot.nv
     start = np.zeros(robot.nv)
     probe.update(robot.q_reference, still)

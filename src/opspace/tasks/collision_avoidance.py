@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
 
 from opspace.errors import InputError, unknown_name
 from opspace.law.scalars import RETURN_SPEED
 from opspace.robots.protocol import Robot
+from opspace.robots.shape_file import SUFFIXES, read_shapes
 from opspace.robots.shapes import LinkCapsule, joints_that_move, shapes_of
+from opspace.robots.srdf import SUFFIX as SRDF
+from opspace.robots.srdf import disabled_pairs
 from opspace.robots.touching import Pairs, pairs_of
 from opspace.tasks.distance_layout import DistanceLayout, lay_out
 from opspace.tasks.obstacles import Obstacle
@@ -34,13 +38,16 @@ class CollisionAvoidance:
     Args:
         obstacles: What is there from the start.
         margin: Distance that is kept, m.
-        shapes: ``"model"``, the collision geometry of the robot's file; or capsules of one's own.
-        pairs: Links that are kept from each other: ``"auto"`` chooses, see
-            `opspace.robots.touching.pairs_of`, ``"none"`` is none, or pairs of frames.
+        shapes: ``"model"``, the collision geometry of the robot's file; a file of ``opspace shapes``,
+            ending in .yaml; or capsules of one's own.
+        pairs: Links that are kept from each other: ``"auto"`` takes those of the file of shapes, or
+            chooses, see `opspace.robots.touching.pairs_of`; an SRDF file leaves out what it disables;
+            ``"none"`` is none; or pairs of frames.
         brake: Acceleration with which distances can be counted on to stop shrinking, m/s².
 
     Raises:
         InputError: A number that cannot be used, or two obstacles of one name.
+        ModelError: A file that cannot be used.
         UnknownNameError: An unknown choice; at binding a frame that the robot does not have.
     """
 
@@ -51,20 +58,18 @@ class CollisionAvoidance:
         self,
         *obstacles: Obstacle,
         margin: float = 0.01,
-        shapes: str | Sequence[LinkCapsule] = "model",
-        pairs: str | Iterable[tuple[str, str]] = "auto",
+        shapes: str | Path | Sequence[LinkCapsule] = "model",
+        pairs: str | Path | Iterable[tuple[str, str]] = "auto",
         brake: float = 4.0,
     ) -> None:
         self.margin = finite(margin, "the margin of collisions")
         if self.margin < 0.0:
             raise InputError(f"the margin of collisions must be at least 0, not {margin}")
         self.brake = positive(brake, "the brake of collisions")
-        if isinstance(shapes, str) and shapes not in SHAPES:
-            raise unknown_name("shapes", shapes, SHAPES)
-        if isinstance(pairs, str) and pairs not in PAIRS:
-            raise unknown_name("pairs", pairs, PAIRS)
-        self._wanted_shapes = shapes if isinstance(shapes, str) else tuple(shapes)
-        self._wanted_pairs = pairs if isinstance(pairs, str) else tuple(pairs)
+        self._wanted_shapes, chosen = _wanted_shapes(shapes)
+        self._wanted_pairs = _wanted_pairs(pairs)
+        if chosen is not None and self._wanted_pairs == "auto":
+            self._wanted_pairs = chosen
         self._robot: Robot | None = None
         self._moved: Mapping[str, frozenset[int]] = {}
         self.shapes: tuple[LinkCapsule, ...] = ()
@@ -96,6 +101,11 @@ class CollisionAvoidance:
             if obstacle.name == name:
                 return obstacle
         raise unknown_name("obstacle", name, [obstacle.name for obstacle in self._obstacles])
+
+    @property
+    def chosen(self) -> Pairs:
+        """Pairs of links that are kept apart, and why the others are left out."""
+        return Pairs(self.pairs, dict(self.left_out))
 
     def add(self, *obstacles: Obstacle) -> None:
         """Let there be more obstacles from the next tick on; from any thread.
@@ -163,6 +173,9 @@ class CollisionAvoidance:
         given = self._wanted_shapes
         shapes = shapes_of(robot) if isinstance(given, str) else given
         frames = list(dict.fromkeys(shape.frame for shape in shapes))
+        for frame in frames:
+            if frame not in robot.frame_names:
+                raise unknown_name("frame", frame, robot.frame_names)
         self.pairs, self.left_out = self._chosen(robot, shapes, frames)
         self._moved = dict(zip(frames, joints_that_move(robot, frames), strict=True))
         self.shapes, self._robot = tuple(shapes), robot
@@ -175,6 +188,10 @@ class CollisionAvoidance:
             return pairs_of(robot, shapes, self.margin)
         if isinstance(wanted, str):
             return Pairs((), {})
+        if isinstance(wanted, Pairs):
+            return wanted
+        if isinstance(wanted, dict):
+            return pairs_of(robot, shapes, self.margin, wanted)
         for name in {name for pair in wanted for name in pair}:
             if name not in frames:
                 raise unknown_name("link with a shape", name, frames)
@@ -200,3 +217,29 @@ class CollisionAvoidance:
         for name in obstacle.ignore:
             if name not in self._moved:
                 raise unknown_name(f"link that {obstacle.name!r} ignores", name, self._moved)
+
+
+def _wanted_shapes(
+    shapes: str | Path | Sequence[LinkCapsule],
+) -> tuple[str | tuple[LinkCapsule, ...], Pairs | None]:
+    """Read what shapes are given as, and the pairs that come with them."""
+    if isinstance(shapes, Path) or (isinstance(shapes, str) and shapes.endswith(SUFFIXES)):
+        return read_shapes(shapes)
+    if isinstance(shapes, str):
+        if shapes not in SHAPES:
+            raise unknown_name("shapes", shapes, (*SHAPES, *(f"a {end} file" for end in SUFFIXES)))
+        return shapes, None
+    return tuple(shapes), None
+
+
+def _wanted_pairs(
+    pairs: str | Path | Iterable[tuple[str, str]],
+) -> str | Pairs | dict[frozenset[str], str] | tuple[tuple[str, str], ...]:
+    """Read what pairs are given as: a choice, what an SRDF file disables, or pairs of frames."""
+    if isinstance(pairs, Path) or (isinstance(pairs, str) and pairs.endswith(SRDF)):
+        return disabled_pairs(pairs)
+    if isinstance(pairs, str):
+        if pairs not in PAIRS:
+            raise unknown_name("pairs", pairs, (*PAIRS, f"a {SRDF} file"))
+        return pairs
+    return tuple(pairs)
