@@ -66,7 +66,7 @@ class CollisionAvoidance:
         if self.margin < 0.0:
             raise InputError(f"the margin of collisions must be at least 0, not {margin}")
         self.brake = positive(brake, "the brake of collisions")
-        self._wanted_shapes, chosen = _wanted_shapes(shapes)
+        self._wanted_shapes, chosen = wanted_shapes(shapes)
         self._wanted_pairs = _wanted_pairs(pairs)
         if chosen is not None and self._wanted_pairs == "auto":
             self._wanted_pairs = chosen
@@ -219,7 +219,7 @@ class CollisionAvoidance:
                 raise unknown_name(f"link that {obstacle.name!r} ignores", name, self._moved)
 
 
-def _wanted_shapes(
+def wanted_shapes(
     shapes: str | Path | Sequence[LinkCapsule],
 ) -> tuple[str | tuple[LinkCapsule, ...], Pairs | None]:
     """Read what shapes are given as, and the pairs that come with them."""

@@ -89,7 +89,7 @@ def lay_out(
     """
     covers = [shape.balls() for shape in shapes]
     of_shape = np.repeat(np.arange(len(covers)), [len(balls) for balls, _ in covers])
-    places = [_along(shape) for shape in shapes]
+    places = [along(shape) for shape in shapes]
     frames = np.array([robot.frame_id(shape.frame) for shape in shapes], np.int64)
     halves = np.array([(0.0, 0.0, half) for *_, half in places]).reshape(-1, 3)
     lower, upper = ([getattr(o, side) for o in obstacles] for side in ("lower", "upper"))
@@ -146,7 +146,7 @@ def _rows(
     return tuple(names), np.array(rows, np.int64).reshape(-1, 3)
 
 
-def _along(shape: LinkCapsule) -> tuple[np.ndarray, np.ndarray, float]:
+def along(shape: LinkCapsule) -> tuple[np.ndarray, np.ndarray, float]:
     """Axes with z along a capsule, its middle and half its length, m."""
     start, end = np.array(shape.start), np.array(shape.end)
     length = float(np.linalg.norm(end - start))
