@@ -117,6 +117,10 @@ def test_an_obstacle_that_comes_late_is_told(tmp_path):
     controller.collisions.add(late)
     with pytest.warns(UserWarning, match="'late' came after the recording began"):
         moved(controller, 2, lambda k: None, [recorder.observe])
+    controller.robot.add_frame("cup", parent="link6")
+    controller.collisions.carry(osc.LinkCapsule("cup", (0, 0, 0), (0, 0, 0.1), 0.03))
+    with pytest.warns(UserWarning, match="what is carried on 'cup' came after"):
+        moved(controller, 2, lambda k: None, [recorder.observe])
     recorder.close()
 
 

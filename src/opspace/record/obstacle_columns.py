@@ -111,22 +111,16 @@ class CollisionRows:
     """
 
     def __init__(self, controller: ReferenceController, guard: CollisionAvoidance) -> None:
-        self._controller = controller
+        self._controller, self._guard = controller, guard
         self._pairs = pairs_of(guard)
         self._names = tuple(obstacle.name for obstacle in guard.obstacles)
-        self._known = set(self._names)
+        self._known = {*self._names, *guard.carried}
 
     def row(self, distances: Mapping[str, Distance]) -> list[np.ndarray]:
         """Give the numbers of one tick for `columns_of_collisions`."""
         placings = self._controller.placings
-        if late := placings.keys() - self._known:
-            self._known |= late
-            names = ", ".join(map(repr, sorted(late)))
-            warnings.warn(
-                f"the obstacle {names} came after the recording began: where it is is not recorded, and "
-                "a replay does not know of it",
-                stacklevel=2,
-            )
+        self._tell("the obstacle", placings.keys() - self._known)
+        self._tell("what is carried on", self._guard.carried.keys() - self._known)
         apart = distances.values()
         least = min((pair.distance for pair in apart), default=math.inf)
         taken = max((pair.taken for pair in apart), default=0.0)
@@ -135,6 +129,18 @@ class CollisionRows:
             for name in self._pairs
         ]
         return [np.array([least, taken, *each]), *row_of_placings(placings, self._names)]
+
+    def _tell(self, what: str, late: set[str]) -> None:
+        """Say once what a recording has no columns for."""
+        if not late:
+            return
+        self._known |= late
+        names = ", ".join(map(repr, sorted(late)))
+        warnings.warn(
+            f"{what} {names} came after the recording began: it is not recorded, and a replay does not "
+            "know of it",
+            stacklevel=3,
+        )
 
 
 def row_of_placings(placings: Mapping[str, Placing], names: Sequence[str]) -> list[np.ndarray]:

@@ -85,6 +85,42 @@ def pairs_of(
     return Pairs(tuple(kept), left_out)
 
 
+def carried_pairs(
+    robot: Robot, shapes: Sequence[LinkCapsule], carried: Sequence[LinkCapsule], margin: float
+) -> tuple[tuple[str, str], ...]:
+    """Choose the links that something on one frame is to be kept from.
+
+    Args:
+        robot: The robot; it is not changed, and its state is where the thing has been taken.
+        shapes: The capsules of its links.
+        carried: Those of the thing, all on one frame.
+        margin: Distance that is to be kept, m.
+
+    Returns:
+        Links with more than one joint between that are not within the margin now, each with the frame.
+    """
+    frame = carried[0].frame
+    links = list(dict.fromkeys(shape.frame for shape in shapes))
+    moved = joints_that_move(robot, [*links, frame])
+    probe = robot.fresh()
+    probe.update(robot.q, np.zeros(robot.nv))
+    found: list[tuple[str, str]] = []
+    for link, joints in zip(links, moved, strict=False):
+        if len(joints ^ moved[-1]) <= 1:
+            continue
+        near = min(
+            float(segment_distance(_ends(probe, one)[None], _ends(probe, two)[None])[0])
+            - one.radius
+            - two.radius
+            for one in shapes
+            if one.frame == link
+            for two in carried
+        )
+        if near >= margin:
+            found.append((link, frame))
+    return tuple(found)
+
+
 def _reason(gap: np.ndarray, margin: float) -> str:
     if np.mean(gap < 0.0) > ALWAYS:
         return f"they overlap in {100.0 * np.mean(gap < 0.0):.0f} % of all postures"

@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
+from types import MappingProxyType
 
 import numpy as np
 
@@ -13,6 +14,8 @@ from opspace.command import Distance
 from opspace.robots.protocol import Robot
 from opspace.robots.shapes import LinkCapsule
 from opspace.tasks.obstacles import Obstacle, Placing
+
+NOTHING_TOUCHES: Mapping[str, frozenset[str]] = MappingProxyType({})
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,6 +80,7 @@ def lay_out(
     moved: Mapping[str, frozenset[int]],
     pairs: Sequence[tuple[str, str]],
     obstacles: tuple[Obstacle, ...],
+    touches: Mapping[str, frozenset[str]] = NOTHING_TOUCHES,
 ) -> DistanceLayout:
     """Cover the links with balls, and pair these with the sets that they are to keep away from.
 
@@ -86,6 +90,7 @@ def lay_out(
         moved: Joints that move each link, by frame.
         pairs: Links that are kept apart.
         obstacles: The obstacles.
+        touches: Names of the obstacles that a link may touch, by frame, beside what these say.
     """
     covers = [shape.balls() for shape in shapes]
     of_shape = np.repeat(np.arange(len(covers)), [len(balls) for balls, _ in covers])
@@ -93,7 +98,7 @@ def lay_out(
     frames = np.array([robot.frame_id(shape.frame) for shape in shapes], np.int64)
     halves = np.array([(0.0, 0.0, half) for *_, half in places]).reshape(-1, 3)
     lower, upper = ([getattr(o, side) for o in obstacles] for side in ("lower", "upper"))
-    names, rows = _rows(shapes, of_shape, moved, pairs, obstacles)
+    names, rows = _rows(shapes, of_shape, moved, pairs, obstacles, touches)
     extra = len(obstacles)
     return DistanceLayout(
         obstacles,
@@ -118,6 +123,7 @@ def _rows(
     moved: Mapping[str, frozenset[int]],
     pairs: Sequence[tuple[str, str]],
     obstacles: Sequence[Obstacle],
+    touches: Mapping[str, frozenset[str]],
 ) -> tuple[tuple[str, ...], np.ndarray]:
     """Name the pairs of bodies, and give the ball, set and pair of every row."""
     parts: dict[str, list[int]] = {}
@@ -139,7 +145,9 @@ def _rows(
         names.append(f"{one}/{two}")
     for k, obstacle in enumerate(obstacles, len(shapes)):
         for frame, joints in moved.items():
-            if joints and frame not in obstacle.ignore:
+            if frame not in parts or not joints:
+                continue
+            if frame not in obstacle.ignore and obstacle.name not in touches.get(frame, ()):
                 for i in parts[frame]:
                     keep(i, k)
                 names.append(f"{frame}/{obstacle.name}")
