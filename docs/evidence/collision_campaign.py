@@ -27,12 +27,16 @@ BESIDE = 0.7
 
 
 class Found(NamedTuple):
-    """What became of a start; without ticks there was no posture clear of everything."""
+    """What became of a start; without ticks there was no posture clear of everything.
+
+    ``least`` is the least distance before any tick was lost, ``after`` that of the whole run, m.
+    """
 
     kind: str
     seed: int
     ticks: int
     least: float
+    after: float
     lost: bool
     why: str
 
@@ -104,7 +108,7 @@ def move(model, tau, q, v):
 
 
 def one_start(kind, seed):
-    """Run one start to its end, or until no torque keeps everything apart."""
+    """Run one start to its end."""
     rng = np.random.default_rng([KINDS.index(kind), seed])
     others = []
     if kind == TWO:
@@ -126,33 +130,38 @@ def one_start(kind, seed):
     models = [controller.robot.fresh() for controller in controllers]
     states = clear_posture(rng, models, watches, follow)
     if states is None:
-        return Found(kind, seed, 0, np.inf, False, "")
-    least, ticks = np.inf, round(1e3 * SECONDS)
+        return Found(kind, seed, 0, np.inf, np.inf, False, "")
+    least, after, why, ticks = np.inf, np.inf, "", round(1e3 * SECONDS)
     for k in range(ticks):
         follow(states)
         commands = [c.step(1e-3 * k, *s) for c, s in zip(controllers, states, strict=True)]
         for command in commands:
             pair, distance = nearest(command)
-            if osc.Status.COLLISION_LOST in command.status:
-                why = f"{1e3 * distance:.0f} mm, {pair}, {command.status}"
-                return Found(kind, seed, k + 1, least, True, why)
-            least = min(least, distance)
+            if osc.Status.COLLISION_LOST in command.status and not why:
+                why = f"at {k} ms, {1e3 * distance:.0f} mm apart, {pair}, {command.status}"
+            after = min(after, distance)
+            least = least if why else after
         moved = zip(models, commands, states, strict=True)
         states = [move(model, command.tau, *state) for model, command, state in moved]
-    return Found(kind, seed, ticks, least, False, "")
+    return Found(kind, seed, ticks, least, after, bool(why), why)
 
 
 def summary(found):
     """Write a table of what was found, and every start that was lost."""
-    print("| | starts | least distance [mm] | lost |\n| --- | ---: | ---: | ---: |")
+    print(
+        "| | starts | least distance before a loss [mm] | with a loss | least of these, after it [mm] |"
+    )
+    print("| --- | ---: | ---: | ---: | ---: |")
     for kind in KINDS:
         runs = [run for run in found if run.kind == kind and run.ticks]
         if runs:
             least = 1e3 * min(run.least for run in runs)
-            print(f"| {kind} | {len(runs)} | {least:.2f} | {sum(run.lost for run in runs)} |")
+            lost = [1e3 * run.after for run in runs if run.lost]
+            worst = f"{min(lost):.1f}" if lost else ""
+            print(f"| {kind} | {len(runs)} | {least:.2f} | {len(lost)} | {worst} |")
     for run in found:
         if run.lost:
-            print(f"{run.kind} {run.seed}: lost at {run.ticks} ms, {run.why}")
+            print(f"{run.kind} {run.seed}: {1e3 * run.after:.1f} mm in the end; lost {run.why}")
     print(dict(Counter(run.kind for run in found if not run.ticks)), "without a clear posture")
 
 

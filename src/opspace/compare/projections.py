@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 from opspace.command import Command, Status
 from opspace.controller import Controller
 from opspace.controller.wrenches import Wrenches
+from opspace.errors import InputError
 from opspace.kernels.columns import KEEP_TORQUE
 from opspace.law import nearest_acceleration
 from opspace.law.convex import box_distance
@@ -85,9 +86,15 @@ class AnotherProjection(Controller):
     def step(
         self, t: float, q: ArrayLike, v: ArrayLike, *, wrenches: Wrenches | None = None
     ) -> Command:
-        """See `opspace.Controller.step`."""
+        """See `opspace.Controller.step`.
+
+        Raises:
+            InputError: See there; or the robot or the stack has no compiled tick.
+        """
         command = super().step(t, q, v, wrenches=wrenches)
-        if self._plan is None or Status.FAULT in command.status:
+        if self._plan is None:
+            raise InputError(f"{type(self).__name__} needs a robot and a stack with a compiled tick")
+        if Status.FAULT in command.status:
             return command
         wish = self._wish(self._plan, command)
         tau = wish.U @ (wish.U.T @ self.realised(wish)) + wish.balance

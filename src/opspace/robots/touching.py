@@ -18,6 +18,10 @@ POSTURES = 1000
 ALWAYS = 0.95
 """Links that overlap in more of the postures than this are built so."""
 
+OFTEN = 0.4
+"""Of links that are within the margin in more of the postures than this capsules cannot tell where they
+touch: such a pair would be at its bound wherever the arm goes."""
+
 NEAR = 0.05
 """Links that never come nearer than this need not be watched, m."""
 
@@ -44,7 +48,8 @@ def pairs_of(
 
     Left out are links with at most one joint between them, links that are nearer than the margin in the
     reference posture, and by what random postures inside the joint limits show, links that overlap
-    nearly always and links that never come near each other.
+    nearly always, links that are within the margin so often that their capsules are too coarse for
+    them, and links that never come near each other.
 
     Args:
         robot: The robot; it is not changed.
@@ -126,6 +131,10 @@ def _reason(gap: np.ndarray, margin: float) -> str:
         return f"they overlap in {100.0 * np.mean(gap < 0.0):.0f} % of all postures"
     if near := _near(gap, margin):
         return near
+    if np.mean(gap < margin) > OFTEN:
+        return (
+            f"within {1e3 * margin:g} mm in {100.0 * np.mean(gap < margin):.0f} % of all postures"
+        )
     if np.min(gap) > NEAR + margin:
         return f"never nearer than {1e3 * np.min(gap):.0f} mm"
     return ""
