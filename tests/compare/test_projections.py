@@ -5,7 +5,7 @@ import pytest
 
 import opspace as osc
 from opspace.compare import collision_experiment as experiment
-from opspace.compare.projections import AnotherProjection, BarrierProgram, Wish
+from opspace.compare.projections import AnotherProjection, BarrierProgram, Wanted
 from opspace.scenario.build import build
 from opspace.scenario.load import load_scenario
 
@@ -18,7 +18,7 @@ class Same(AnotherProjection):
         self.library = osc.Controller.step(self, t, q, v, wrenches=wrenches).tau
         return found
 
-    def realised(self, wish: Wish):
+    def realised(self, wish: Wanted):
         bounds = self._plan.tick.bounds
         self.wish = wish
         return wish.nearest(wish.W, np.array(bounds.lower), np.array(bounds.upper), wish.most)

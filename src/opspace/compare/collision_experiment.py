@@ -50,7 +50,7 @@ STOP_SPEED = 50.0
 
 
 @dataclass(frozen=True)
-class Kept:
+class KeptApart:
     """What one way made of one scene.
 
     Attributes:
@@ -74,7 +74,7 @@ class Kept:
 
 
 @dataclass(frozen=True)
-class Scene:
+class GuardedScene:
     """One scene under several ways.
 
     Attributes:
@@ -87,7 +87,7 @@ class Scene:
     name: str
     margin: float
     recordings: Mapping[str, Recording]
-    found: Mapping[str, Kept]
+    found: Mapping[str, KeptApart]
 
 
 def reproduce_collisions(
@@ -95,7 +95,7 @@ def reproduce_collisions(
     scenes: Sequence[str] = SCENES,
     ways: Sequence[str] = tuple(WAYS),
     progress: ProgressBar | None = None,
-) -> list[Scene]:
+) -> list[GuardedScene]:
     """Run scenes in every way and write ``metrics.json``.
 
     Args:
@@ -116,7 +116,7 @@ def reproduce_collisions(
     return done
 
 
-def _run(name: str, ways: Sequence[str], out: Path, progress: ProgressBar | None) -> Scene:
+def _run(name: str, ways: Sequence[str], out: Path, progress: ProgressBar | None) -> GuardedScene:
     scenario = load_scenario(name)
     guard = scenario.collisions
     if guard is None:
@@ -135,7 +135,7 @@ def _run(name: str, ways: Sequence[str], out: Path, progress: ProgressBar | None
         for way in ways
     }
     found = {way: _measure(recording) for way, recording in recordings.items()}
-    return Scene(name, guard.margin, recordings, found)
+    return GuardedScene(name, guard.margin, recordings, found)
 
 
 def torque_steps(recording: Recording) -> np.ndarray:
@@ -144,14 +144,14 @@ def torque_steps(recording: Recording) -> np.ndarray:
     return steps / (1e3 * np.diff(recording.t))
 
 
-def _measure(recording: Recording) -> Kept:
+def _measure(recording: Recording) -> KeptApart:
     steps = torque_steps(recording)
     error, turned = (
         1e3 * float(np.mean(np.linalg.norm(recording.group(f"tasks/{task}/error"), axis=1)))
         for task in ("position", "orientation")
     )
     lost = recording["status"].astype(np.int64) & int(Status.COLLISION_LOST)
-    return Kept(
+    return KeptApart(
         least=1e3 * float(np.min(recording["distances/least"])),
         step=float(np.max(steps)),
         step_99=float(np.quantile(steps, 0.99)),
@@ -162,7 +162,7 @@ def _measure(recording: Recording) -> Kept:
     )
 
 
-def collisions_table(scenes: Sequence[Scene]) -> tuple[list[str], list[list[str]]]:
+def collisions_table(scenes: Sequence[GuardedScene]) -> tuple[list[str], list[list[str]]]:
     """Write what was found, a row for each scene and way."""
     heads = ["scene", "way", "least distance [mm]", "torque step [N·m/ms]", "99 % of them"]
     heads += ["mean tool error [mm]", "turned [mrad]", "ticks lost", "run"]
@@ -177,7 +177,7 @@ def collisions_table(scenes: Sequence[Scene]) -> tuple[list[str], list[list[str]
     return heads, rows
 
 
-def draw_collisions(scenes: Sequence[Scene], out: Path) -> list[str]:
+def draw_collisions(scenes: Sequence[GuardedScene], out: Path) -> list[str]:
     """Draw the figure, and a strip of pictures and a film of every scene with the library.
 
     Returns:
@@ -192,7 +192,7 @@ def draw_collisions(scenes: Sequence[Scene], out: Path) -> list[str]:
         snapshot_strip,
     )
     from opspace.plots import save  # noqa: PLC0415
-    from opspace.plots.collisions import collisions_figure  # noqa: PLC0415
+    from opspace.plots.collisions_plot import collisions_figure  # noqa: PLC0415
 
     margins = {scene.name: scene.margin for scene in scenes}
     recordings = {scene.name: scene.recordings for scene in scenes}

@@ -32,7 +32,7 @@ RANK = 1e-6
 """Directions of the switched rows that are weaker than this part of the strongest are left out."""
 
 
-class Wish(NamedTuple):
+class Wanted(NamedTuple):
     """What the law wants in one tick, and what is known of the robot.
 
     Attributes:
@@ -93,18 +93,20 @@ class AnotherProjection(Controller):
         """
         command = super().step(t, q, v, wrenches=wrenches)
         if self._plan is None:
-            raise InputError(f"{type(self).__name__} needs a robot and a stack with a compiled tick")
+            raise InputError(
+                f"{type(self).__name__} needs a robot and a stack with a compiled tick"
+            )
         if Status.FAULT in command.status:
             return command
         wish = self._wish(self._plan, command)
         tau = wish.U @ (wish.U.T @ self.realised(wish)) + wish.balance
         return command._replace(tau=np.clip(tau, -wish.room, wish.room))
 
-    def realised(self, wish: Wish) -> np.ndarray:
+    def realised(self, wish: Wanted) -> np.ndarray:
         """Choose an acceleration, (n,) rad/s²."""
         return wish.acceleration
 
-    def _wish(self, plan: Plan, command: Command) -> Wish:
+    def _wish(self, plan: Plan, command: Command) -> Wanted:
         tick, limits = plan.tick, self.stack.limits
         U, balance = np.array(tick.inertia.U), np.array(tick.balance)
         keeps = bool(tick.option[KEEP_TORQUE] != 0.0)
@@ -112,7 +114,7 @@ class AnotherProjection(Controller):
         kept = keeps or len(tick.distance) > 0 or (limits is not None and limits.law.bound)
         wanted = np.array(tick.wanted_tau) if kept else command.tau
         n = balance.size
-        return Wish(
+        return Wanted(
             U,
             _metric(plan, command, n),
             balance,
@@ -129,7 +131,7 @@ class AnotherProjection(Controller):
 class Unkept(AnotherProjection):
     """Nothing is kept apart; motors and joints are, as ever."""
 
-    def realised(self, wish: Wish) -> np.ndarray:
+    def realised(self, wish: Wanted) -> np.ndarray:
         """See `AnotherProjection.realised`."""
         joints = self._bounds()
         return wish.nearest(wish.W, *joints, np.full(wish.most.size, np.inf))
@@ -143,7 +145,7 @@ class Unkept(AnotherProjection):
 class NearestInInertia(Unkept):
     """The same bounds, the nearest acceleration in the inertia instead of what the tasks see."""
 
-    def realised(self, wish: Wish) -> np.ndarray:
+    def realised(self, wish: Wanted) -> np.ndarray:
         """See `AnotherProjection.realised`."""
         return wish.nearest(np.eye(wish.v.size), *self._bounds(), wish.most)
 
@@ -151,7 +153,7 @@ class NearestInInertia(Unkept):
 class SwitchedDistances(Unkept):
     """Pairs nearer than 5 cm become a task of their own at the top, from one tick to the next."""
 
-    def realised(self, wish: Wish) -> np.ndarray:
+    def realised(self, wish: Wanted) -> np.ndarray:
         """See `AnotherProjection.realised`."""
         near = wish.D < SWITCHED
         free = super().realised(wish)
@@ -172,7 +174,7 @@ class BarrierProgram(AnotherProjection):
     library's projection.
     """
 
-    def realised(self, wish: Wish) -> np.ndarray:
+    def realised(self, wish: Wanted) -> np.ndarray:
         """See `AnotherProjection.realised`."""
         lower, upper = np.full(wish.v.size, -np.inf), np.full(wish.v.size, np.inf)
         limits = self.stack.limits
