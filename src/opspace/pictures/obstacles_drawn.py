@@ -8,9 +8,9 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-import mujoco
 import numpy as np
 
+from opspace.errors import missing_extra
 from opspace.pictures.offscreen import Canvas
 from opspace.record import Recording
 from opspace.record.obstacle_columns import (
@@ -20,6 +20,11 @@ from opspace.record.obstacle_columns import (
     row_columns,
 )
 from opspace.tasks.obstacles import Obstacle, Placing
+
+try:
+    import mujoco
+except ImportError:
+    raise missing_extra("mujoco", "sim") from None
 
 COLOR = (0.80, 0.52, 0.20, 0.55)
 PLANE = 0.9
