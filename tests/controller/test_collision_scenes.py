@@ -46,4 +46,5 @@ def test_from_random_starts_nothing_comes_nearer_unless_it_is_said(monkeypatch, 
     # Of two arms neither knows how the other accelerates.
     slack = 1e-3 if kind == campaign.TWO else 1e-4
     assert min(run.least for run in runs) >= 0.01 - slack
-    assert sum(run.lost for run in runs) <= 0.1 * len(runs) + 1
+    often = 0.5 if kind == campaign.TWO else 0.05
+    assert sum(run.lost for run in runs) <= often * len(runs) + 1

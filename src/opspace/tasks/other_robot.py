@@ -22,8 +22,8 @@ class OtherRobot:
     """The links of a robot as obstacles for another one, with their velocities.
 
     Hand `obstacles` to the other's `opspace.CollisionAvoidance`, and call `follow` with what this robot
-    does, from any thread. Each of two arms may avoid the other in this way: where both brake, they do
-    more than either has to.
+    does, from any thread. Each of two arms may avoid the other in this way, as the last line of
+    defence: each takes the other for something that goes on as it moves.
 
     Args:
         robot: The robot; it is not changed.
