@@ -89,6 +89,7 @@ if TYPE_CHECKING:
     from opspace.tasks import OrientationJerkLimited as OrientationJerkLimited
     from opspace.tasks import OrientationMinimumJerk as OrientationMinimumJerk
     from opspace.tasks import OrientationTask as OrientationTask
+    from opspace.tasks import OtherRobot as OtherRobot
     from opspace.tasks import PoseReference as PoseReference
     from opspace.tasks import PoseTask as PoseTask
     from opspace.tasks import PositionTask as PositionTask
@@ -133,7 +134,8 @@ _NAMES = {
         "ActivationProduct ActivationUnion AngularMomentumTask Ball Box Capsule Chain Circle "
         "CollisionAvoidance ComTask Constant Contact DistanceBuffer ForceTask GiveWay HalfSpace "
         "ImpedanceTask JerkLimited JointBuffer JointLimits JointTask MinimumJerk "
-        "OrientationJerkLimited OrientationMinimumJerk OrientationTask PoseReference PoseTask "
+        "OrientationJerkLimited OrientationMinimumJerk OrientationTask OtherRobot PoseReference "
+        "PoseTask "
         "PositionTask PostureTask Reference RelativeOrientationTask RelativePoseTask "
         "RelativePositionTask Sample Task TaskTerms Touch TrackingTask ViaPoints"
     ),

@@ -202,6 +202,7 @@ class Which(str, Enum):
     JOINT_LIMIT = "joint-limit"
     FORCES = "forces"
     STIFFNESS = "stiffness"
+    COLLISIONS = "collisions"
     ALL = "all"
 
 
@@ -209,15 +210,20 @@ class Which(str, Enum):
 def reproduce(
     which: Annotated[Which, typer.Argument(help="The experiment.")] = Which.ALL,
     robot: Annotated[
-        str, typer.Option(help="Name of a robot, or path of a .urdf or .xml file.")
-    ] = "puma560",
+        str | None, typer.Option(help="Name of a robot, or path of a .urdf or .xml file; puma560.")
+    ] = None,
     out: Annotated[Path, typer.Option(help="Directory to write to.")] = Path("results"),
 ) -> None:
     """Repeat the paper's experiments: without the method, with a hard switch, and with it.
 
-    Two more are not part of all: forces touches a table in several ways and wipes it, stiffness presses
-    on tables from 3e2 to 1e6 N/m.
+    Three more are not part of all, and take minutes: forces touches a table in several ways and wipes
+    it, stiffness presses on tables from 3e2 to 1e6 N/m, collisions are five scenes of a Panda that would
+    touch something, in five ways.
     """
+    if which is Which.COLLISIONS:
+        _reproduce_collisions(robot, out)
+        return
+    robot = robot or "puma560"
     if which in (Which.FORCES, Which.STIFFNESS):
         _reproduce_touch(which, robot, out)
         return
@@ -257,6 +263,26 @@ def _reproduce_touch(which: Which, robot: str, out: Path) -> None:
         _print_table(*numbers_table(numbers, "way"))
         draw_touches(runs, directory / "touch.png")
     print(f"results: {directory}")
+
+
+def _reproduce_collisions(robot: str | None, out: Path) -> None:
+    from opspace.compare.collision_experiment import (
+        collisions_table,
+        draw_collisions,
+        reproduce_collisions,
+    )
+    from opspace.errors import InputError
+    from opspace.runs.progress import ProgressBar
+
+    if robot not in (None, "panda"):
+        raise InputError(f"the scenes of collisions are those of a panda, not of {robot!r}")
+    out = out / "collisions"
+    with ProgressBar() as progress:
+        done = reproduce_collisions(out, progress=progress)
+    _print_table(*collisions_table(done))
+    for problem in draw_collisions(done, out):
+        print(problem, file=sys.stderr)
+    print(f"results: {out}")
 
 
 @app.command(epilog="Example: opspace compare showpiece --method opspace --method switch")
@@ -438,6 +464,35 @@ def check(
     print(f"\nbuffer: a direction is absent below {lower:g} and fully active above {upper:g}")
     for warning in report.warnings:
         print(f"warning: {warning}")
+
+
+@app.command(epilog="Example: opspace shapes panda --out panda-shapes.yaml")
+def shapes(
+    robot: Annotated[str, typer.Argument(help="Name of a robot, or path of a .urdf or .xml file.")],
+    margin: Annotated[float, typer.Option(help="Distance that is to be kept, m.")] = 0.01,
+    srdf: Annotated[
+        Path | None, typer.Option(help="SRDF file with the pairs of links to leave out.")
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="File to write, .yaml; CollisionAvoidance reads it back.")
+    ] = None,
+) -> None:
+    """Fit capsules to the links of a robot, and tell which pairs are kept apart and why others not."""
+    from opspace.robots import load_robot
+    from opspace.robots.shape_file import write_shapes
+    from opspace.runs.shapes_report import pairs_table, shapes_table
+    from opspace.tasks import CollisionAvoidance
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ModelWarning)  # opspace check tells them
+        found = load_robot(robot)
+    guard = CollisionAvoidance(margin=margin, pairs="auto" if srdf is None else srdf)
+    guard.bind(found)
+    _print_table(*shapes_table(guard.shapes))
+    print()
+    _print_table(*pairs_table(guard))
+    if out is not None:
+        print(f"results: {write_shapes(out, found.name, margin, guard.shapes, guard.chosen)}")
 
 
 def _position(text: str) -> tuple[str, float | None]:

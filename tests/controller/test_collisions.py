@@ -273,3 +273,51 @@ def test_what_cannot_be_used_is_refused_by_name():
         exported(controller, (), "quintic")
     with pytest.raises(osc.InputError, match="puma560"):
         arm(osc.Controller, collisions=guard)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_what_is_carried_is_kept_away_until_it_is_released(kind):
+    tool = reference_tool()
+    table = osc.HalfSpace(tool - [0.0, 0.0, 0.3], name="table", ignore=["link1"])
+    controller, guard = arm(kind, table, osc.Ball(0.05, (2.0, 0.0, 1.0)))
+    robot = controller.robot
+    controller.step(0.0, robot.q_reference, np.zeros(6))
+    before = controller.step(0.001, robot.q_reference, np.zeros(6))
+    robot.add_frame("cup", parent="link6", placement=(0.0, 0.0, 0.25))
+    cup = osc.LinkCapsule("cup", (0.0, 0.0, 0.0), (0.0, 0.0, 0.1), 0.03)
+    guard.carry(cup, ignore=["ball"])
+    with_ = controller.step(0.002, robot.q_reference, np.zeros(6))
+    assert set(with_.distances) - set(before.distances) == {"link1/cup", "link3/cup", "cup/table"}
+    robot.update(robot.q_reference, np.zeros(6))
+    R, x = robot.rotation(robot.frame_id("cup")), robot.position(robot.frame_id("cup"))
+    low = min((x + R @ np.array(end))[2] for end in (cup.start, cup.end)) - cup.radius
+    # Balls on the axis stand out by the sag at most.
+    apart = with_.distances["cup/table"].distance
+    assert low - (tool[2] - 0.3) - 3e-3 <= apart <= low - (tool[2] - 0.3) + 1e-9
+    guard.release("cup")
+    after = controller.step(0.003, robot.q_reference, np.zeros(6))
+    assert set(after.distances) == set(before.distances)
+    assert after.tau.tobytes() == before.tau.tobytes()
+    guard.carry(cup)
+    again = controller.step(0.004, robot.q_reference, np.zeros(6))
+    assert "cup/ball" in again.distances
+
+
+def test_what_cannot_be_carried_is_refused():
+    controller, guard = arm(ReferenceController)
+    cup = osc.LinkCapsule("cup", (0.0, 0.0, 0.0), (0.0, 0.0, 0.1), 0.03)
+    for wrong, error, words in (
+        ((), osc.InputError, "on one frame"),
+        ((cup, SHAPES[0]), osc.InputError, "on one frame"),
+        ((cup,), osc.UnknownNameError, "cup"),
+        ((SHAPES[1],), osc.InputError, "has shapes already"),
+    ):
+        with pytest.raises(error, match=words):
+            guard.carry(*wrong)
+    controller.robot.add_frame("cup", parent="link6")
+    with pytest.raises(osc.UnknownNameError, match="tabel"):
+        guard.carry(cup, ignore=["tabel"])
+    with pytest.raises(osc.UnknownNameError, match="cup"):
+        guard.release("cup")
+    with pytest.raises(osc.InputError, match="before a controller"):
+        osc.CollisionAvoidance(shapes=SHAPES).carry(cup)

@@ -12,6 +12,9 @@ BALL = {"shape": "ball", "radius": 0.1, "position": [2.0, 0.0, 0.0], "velocity":
 WALL = {"shape": "half-space", "normal": [-1.0, 0.0, 0.0], "position": [2.0, 0.0, 0.0]}
 
 
+SHIPPED = ["table", "self-fold", "moving-ball", "gap", "clutter"]
+
+
 def scenario(obstacles, **more):
     return scenario_from(
         {
@@ -53,7 +56,7 @@ def test_what_a_shape_does_not_have_is_refused_with_its_key(entry, said):
     assert "collisions" in str(error.value)
 
 
-@pytest.mark.parametrize("name", ["table", "self-fold", "moving-ball", "gap"])
+@pytest.mark.parametrize("name", SHIPPED)
 def test_shipped_scenes_can_be_built(name):
     assert build(load_scenario(name)).controller.collisions.layout().rows.size
 
@@ -69,7 +72,7 @@ def test_a_recording_tells_the_nearest_pair_and_is_the_same_again(tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["table", "self-fold", "moving-ball", "gap"])
+@pytest.mark.parametrize("name", SHIPPED)
 def test_in_shipped_scenes_nothing_comes_nearer_than_the_margin(name):
     built = build(load_scenario(name))
     least, happened = [], osc.Status.OK

@@ -47,14 +47,25 @@ tasks:
   elbow: {type: joint, joint: joint3, level: 2, present: false}
   posture: {type: posture, level: 3, kp: 30}
 """
+GUARDED = """
+robot: panda
+duration: 1.0
+torque_limits: priority
+tasks:
+  posture: {type: posture, level: 0}
+collisions:
+  obstacles:
+    ball: {shape: ball, radius: 0.08, position: [0.5, 0.45, 0.6]}
+    table: {shape: half-space, position: [0, 0, 0.1], normal: [0, 0, 1], ignore: [panda_link1]}
+"""
 PICTURES = Path(os.environ.get("OPSPACE_SCREENSHOTS", ""))
 """Where screenshots are kept to be looked at; not at all where the variable is not set."""
 
 
 @pytest.fixture
-def run(tmp_path):
+def run(tmp_path, request):
     """A run on a page: its directory, its address, and the process."""
-    (tmp_path / "story.yaml").write_text(STORY)
+    (tmp_path / "story.yaml").write_text(getattr(request, "param", STORY))
     out = tmp_path / "run"
     words = ["view", str(tmp_path / "story.yaml"), "--out", str(out), "--port", "18480"]
     process = started(*words)
@@ -132,6 +143,16 @@ def blue_arrow(image):
     return float(x), float(y)
 
 
+def red_arrow(image):
+    """Where the arrow is that moves the obstacle on the right along x."""
+    red, green, blue = image[150:, :900].transpose(2, 0, 1)
+    found = np.argwhere((red > 190) & (red - blue > 90) & (red - green > 90))
+    assert len(found) > 20, "no handle to be seen"
+    right = found[found[:, 1] >= np.quantile(found[:, 1], 0.85)]
+    y, x = np.median(right, axis=0)
+    return float(x), float(y) + 150.0
+
+
 def test_insert_swap_remove_and_drag(run, chromium):
     out, address, _ = run
     page = opened(chromium, address)
@@ -176,6 +197,36 @@ def test_insert_swap_remove_and_drag(run, chromium):
     step = np.abs(np.diff(recording.group("tau"), axis=0)).max()
     assert step < 3.0, "nothing of this is a jolt"
     # The same requests without a browser: the same numbers.
+    again = run_scenario(load_scenario(out / SCENARIO), out.parent / "again", requests=out / FILE)
+    np.testing.assert_array_equal(again.recording.data, recording.data)
+
+
+@pytest.mark.parametrize("run", [GUARDED], indirect=True)
+def test_an_obstacle_is_dragged_at_the_arm(run, chromium):
+    out, address, process = run
+    page = opened(chromium, address)
+    until(lambda: len(load_rows(out)) > 500, "the run goes on once a browser is there")
+    page.get_by_role("tab", name="Distances").click(force=True)
+    until(lambda: page.locator("[data-opspace-pair]").count() > 3, "the nearest pairs were told")
+    page.get_by_label("Shapes of the links").click(force=True)
+    until(lambda: not is_blank(picture(page, "obstacles-1280")[150:, :900]), "it was drawn")
+    x, y = red_arrow(picture(page, "obstacles-before-drag"))
+    page.mouse.move(x, y)
+    page.mouse.down()
+    for step in range(1, 6):
+        page.mouse.move(x + 15.0 * step, y)
+    page.mouse.up()
+    until(lambda: asked(out) and asked(out)[-1]["kind"] == "place", "the ball was dragged")
+    time.sleep(2.0)
+    picture(page, "obstacles-after-drag")
+    page.close()
+    process.send_signal(signal.SIGINT)
+    process.wait(60.0)
+    recording = load(out)
+    way = recording.group("obstacles/ball/position")
+    assert np.linalg.norm(way[-1] - way[0]) > 0.03
+    assert np.min(recording["distances/least"]) > 0.009
+    assert np.abs(np.diff(recording.group("tau"), axis=0)).max() < 3.0
     again = run_scenario(load_scenario(out / SCENARIO), out.parent / "again", requests=out / FILE)
     np.testing.assert_array_equal(again.recording.data, recording.data)
 

@@ -11,6 +11,7 @@ from typing import Any
 from opspace.compare import controllers as others
 from opspace.compare.blendings import CrossFade, Present
 from opspace.compare.laws import continuous_inverse, damped_inverse
+from opspace.compare.projections import BarrierProgram
 from opspace.compare.tsid_controller import TsidController, tsid_installed
 from opspace.controller import Controller, ReferenceController
 from opspace.scenario import Scenario
@@ -94,6 +95,11 @@ METHODS: Mapping[str, Method] = MappingProxyType(
             "the paper's Eq. 15-23 to the letter",
             _NO_BUFFER,
             partial(ReferenceController, law=others.as_printed),
+        ),
+        "cbf-qp": Method(
+            "the library's law, then a quadratic program with control barriers, α = 10/s",
+            "joint ranges, speeds and distances are barriers",
+            BarrierProgram,
         ),
         "tsid": Method(
             "TSID: one quadratic program, 100 to 1 from level to level, weights ramped",

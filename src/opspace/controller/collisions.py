@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -11,6 +12,7 @@ from opspace.law.scalars import admissible_command
 from opspace.robots.protocol import Robot
 from opspace.tasks.collision_avoidance import CollisionAvoidance
 from opspace.tasks.distance_layout import DistanceLayout
+from opspace.tasks.obstacles import Placing
 
 
 class DistanceTerms(NamedTuple):
@@ -18,21 +20,29 @@ class DistanceTerms(NamedTuple):
 
     Attributes:
         layout: Whose distances they are.
+        placings: Where it found the obstacles.
         distance: (rows,) between the shapes, m.
         G: (rows, n) by how much joint accelerations let each shrink faster.
         most: (rows,) m/s².
     """
 
     layout: DistanceLayout
+    placings: tuple[Placing, ...]
     distance: np.ndarray
     G: np.ndarray
     most: np.ndarray
+
+    @property
+    def by_name(self) -> Mapping[str, Placing]:
+        """Where the obstacles were found, by name."""
+        return self.layout.by_name(self.placings)
 
 
 def distance_terms(guard: CollisionAvoidance, robot: Robot, t: float) -> DistanceTerms:
     """Evaluate all distances of a guard at the robot's present state and at time t, s."""
     layout = guard.layout()
-    rows = rows_of(layout, robot, t)
+    placings = layout.placings(t)
+    rows = rows_of(layout, robot, placings)
     balls, sets = layout.rows[:, 0], layout.rows[:, 1]
     distance = rows.distance - layout.ball_radius[balls] - layout.set_radius[sets]
     D = distance - guard.margin
@@ -40,13 +50,13 @@ def distance_terms(guard: CollisionAvoidance, robot: Robot, t: float) -> Distanc
         admissible_command(d, -rate, guard.brake, np.inf, guard.k1, guard.k2, 0.0, 0.0) + drift
         for d, rate, drift in zip(D.tolist(), rows.rate.tolist(), rows.drift.tolist(), strict=True)
     ]
-    return DistanceTerms(layout, distance, -rows.G, np.array(most))
+    return DistanceTerms(layout, placings, distance, -rows.G, np.array(most))
 
 
-def rows_of(layout: DistanceLayout, robot: Robot, t: float) -> DistanceRows:
+def rows_of(layout: DistanceLayout, robot: Robot, placings: Sequence[Placing]) -> DistanceRows:
     """Evaluate the distances of centres of balls to sets that are not grown by their radii."""
     points = _points(layout, robot)
-    bodies = _bodies(layout, robot, t)
+    bodies = _bodies(layout, robot, placings)
     balls, sets = layout.rows[:, 0], layout.rows[:, 1]
     return distance_rows(
         Points._make(part[balls] for part in points),
@@ -68,7 +78,7 @@ def _points(layout: DistanceLayout, robot: Robot) -> Points:
     return found
 
 
-def _bodies(layout: DistanceLayout, robot: Robot, t: float) -> Bodies:
+def _bodies(layout: DistanceLayout, robot: Robot, placings: Sequence[Placing]) -> Bodies:
     """Motion of all sets, those of links and those of obstacles."""
     count, n = layout.set_frame.size, robot.nv
     found = Bodies(
@@ -87,8 +97,8 @@ def _bodies(layout: DistanceLayout, robot: Robot, t: float) -> Bodies:
         found.position[i], found.velocity[i], found.acceleration[i], found.J[i] = _moved(
             robot, frame, arm
         )
-    for i, obstacle in enumerate(layout.obstacles, links):
-        found.rotation[i], found.position[i], found.velocity[i] = obstacle.placing(t)
+    for i, placing in enumerate(placings, links):
+        found.rotation[i], found.position[i], found.velocity[i] = placing
     return found
 
 

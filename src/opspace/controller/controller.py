@@ -46,6 +46,7 @@ from opspace.robots.bodies import make_dynamics
 from opspace.robots.motion_axes import MotionAxes
 from opspace.robots.rigid_model import RigidModel
 from opspace.stack import Blending, Member, Outlook, variables_of
+from opspace.tasks.obstacles import Placing
 from opspace.tasks.task import CHANGES
 from opspace.tasks.validation import finite, numbers
 
@@ -173,6 +174,14 @@ class Controller(ReferenceController):
             Command, (t, tau, status, answer // SOLVE, CompiledReport(plan, memory(), footing))
         )
         return command if self._plain else self._finished(command, members)
+
+    @property
+    def placings(self) -> Mapping[str, Placing]:
+        """Where the last tick found the obstacles of `collisions`, and how they moved, by name."""
+        plan = self._plan
+        if plan is None or plan.distances is None:
+            return super().placings
+        return plan.distances.layout.by_name(plan.distances.placings)
 
     def _added_by_robot(self) -> np.ndarray:
         if not self._robot_adds or self._bodies is None or self._laid_out is None:

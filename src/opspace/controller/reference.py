@@ -28,6 +28,7 @@ from opspace.robots.payload import Payload
 from opspace.robots.protocol import Robot
 from opspace.stack import Blending, Member, Stack
 from opspace.tasks import CollisionAvoidance, ForceTask, JointLimits, Task, TrackingTask
+from opspace.tasks.obstacles import NO_PLACINGS, Placing
 from opspace.tasks.validation import finite, numbers
 
 BIASES = ("joint", "task")
@@ -143,6 +144,7 @@ class ReferenceController:
         stack.attach_contacts(self._touching)
         _bind_collisions(collisions, robot)
         self._collisions = collisions
+        self._placings: Mapping[str, Placing] = NO_PLACINGS
         self._handover: Handover | None = None
         self._last_torque: np.ndarray | None = None
         self._loading: Loading | None = None
@@ -347,6 +349,11 @@ class ReferenceController:
         """Wrenches that the last tick was given, (6,) N and N·m; None where nothing was new."""
         return MappingProxyType({} if self._forces is None else self._forces.given)
 
+    @property
+    def placings(self) -> Mapping[str, Placing]:
+        """Where the last tick found the obstacles of `collisions`, and how they moved, by name."""
+        return self._placings
+
     def step(
         self, t: float, q: ArrayLike, v: ArrayLike, *, wrenches: Wrenches | None = None
     ) -> Command:
@@ -402,7 +409,7 @@ class ReferenceController:
         answer = tick(given)
         if answer is None:
             return self._hold(t, timing | Status.FAULT)
-        tau, status, hard_solves, found, hindrance = answer
+        tau, status, hard_solves, found, hindrance, self._placings = answer
         self.stack.hinder(hindrance)
         if Status.FAULT in status:
             tau = self._braking()

@@ -47,6 +47,7 @@ from opspace.stack import Blending, ContactMember, Member, Mixture, mixture, pre
 from opspace.tasks import JointLimits, PostureTask, TaskTerms, TrackingTask
 from opspace.tasks.activations import own_activation
 from opspace.tasks.collision_avoidance import CollisionAvoidance
+from opspace.tasks.obstacles import NO_PLACINGS, Placing
 from opspace.tasks.validation import shown
 
 REST = ""
@@ -162,7 +163,8 @@ class Blend(NamedTuple):
 class Answer(NamedTuple):
     """Torque (n,), N·m, what happened, the number of hard torques and what there is to report.
 
-    ``hindrance`` is what the contacts could not carry, see `opspace.stack.ContactMember.advance`.
+    ``hindrance`` is what the contacts could not carry, see `opspace.stack.ContactMember.advance`;
+    ``placings`` is where obstacles were found.
     """
 
     tau: np.ndarray
@@ -170,6 +172,7 @@ class Answer(NamedTuple):
     hard_solves: int
     found: Found
     hindrance: float = 0.0
+    placings: Mapping[str, Placing] = NO_PLACINGS
 
 
 def tick(k: Given) -> Answer | None:
@@ -205,7 +208,8 @@ def tick(k: Given) -> Answer | None:
     apart = {} if distances is None else distances.layout.status(distances.distance, kept.taken)
     found = Found(task_status(k.members, h, terms, mixed), levels, active, apart, kept.contacts)
     happened = status(k, kept.tau, info, found) | kept.status
-    return Answer(kept.tau, happened, info.hard_solves, found, kept.hindrance)
+    placings = NO_PLACINGS if distances is None else distances.by_name
+    return Answer(kept.tau, happened, info.hard_solves, found, kept.hindrance, placings)
 
 
 def activations(k: Given) -> list[float]:

@@ -224,12 +224,14 @@ def _two_sided(count, n, owner, least, most, softness, bounds):
 def _project(count, n, bounds):
     """Y = x less the normals times their multipliers, none of which is negative."""
     for i in range(count):
-        bounds.multiplier[i] = 0.0
+        bounds.multiplier[i], bounds.scale[i] = 0.0, abs(bounds.bound[i])
+        for a in range(n):
+            bounds.scale[i] += abs(bounds.normal[i, a] * bounds.x[a])
     for a in range(n):
         bounds.y[a] = bounds.x[a]
     size = 0
     for _ in range(10 * count):
-        worst = _most_broken(count, n, size, bounds)
+        worst = _most_broken(count, n, bounds)
         if worst < 0:
             break
         bounds.active[size] = worst
@@ -238,7 +240,7 @@ def _project(count, n, bounds):
             multipliers(n, known, size, bounds)
             if advance(size, bounds):
                 break
-            known, size = 0, _drop(size, bounds)
+            known, size = _drop(size, bounds)
         for a in range(n):
             bounds.y[a] = bounds.x[a]
             for k in range(size):
@@ -248,20 +250,15 @@ def _project(count, n, bounds):
 
 
 @jit
-def _most_broken(count, n, size, bounds):
+def _most_broken(count, n, bounds):
     worst, most = -1, 0.0
     for i in range(count):
-        known = False
-        for k in range(size):
-            if bounds.active[k] == i:
-                known = True
-        if known:
+        if bounds.multiplier[i] > 0.0:  # it holds already
             continue
-        over, scale = -bounds.bound[i], abs(bounds.bound[i])
+        over = -bounds.bound[i]
         for a in range(n):
             over += bounds.normal[i, a] * bounds.y[a]
-            scale += abs(bounds.normal[i, a] * bounds.x[a])
-        if over > ROUNDING * scale and over > most:
+        if over > ROUNDING * bounds.scale[i] and over > most:
             worst, most = i, over
     return worst
 
@@ -318,11 +315,13 @@ def _drop(size, bounds):
     """Forget the bounds whose multipliers have become zero.
 
     Returns:
-        How many stay.
+        How many before the first of them are factored still, and how many stay.
     """
-    kept = 0
+    first, kept = 0, 0
     for k in range(size):
         if bounds.multiplier[bounds.active[k]] > 0.0:
+            if kept == k:
+                first += 1
             bounds.active[kept] = bounds.active[k]
             kept += 1
-    return kept
+    return first, kept

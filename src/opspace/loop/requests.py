@@ -29,6 +29,7 @@ KINDS: Mapping[str, frozenset[str]] = MappingProxyType(
         "swap": frozenset({"duration"}),
         "lead": frozenset({"position", "orientation"}),
         "gain": frozenset({"kp", "duration"}),
+        "place": frozenset({"obstacle", "position"}),
     }
 )
 """What can be asked for, and what each takes beside its tasks."""
@@ -36,7 +37,13 @@ KINDS: Mapping[str, frozenset[str]] = MappingProxyType(
 FILE = "requests.jsonl"
 """Name of the file beside a recording that tells what was asked for during the run."""
 
-_NEEDED = {"insert": "level", "move": "level", "gain": "kp"}
+_NEEDED = {
+    "insert": ("level",),
+    "move": ("level",),
+    "gain": ("kp",),
+    "place": ("obstacle", "position"),
+}
+_TASKS = {"swap": 2, "place": 0}
 
 
 @dataclass(frozen=True)
@@ -51,6 +58,7 @@ class RunRequest:
         position: (3,) where to lead to, m.
         orientation: Quaternion wxyz to lead to.
         kp: Stiffness to come to, 1/s².
+        obstacle: Name of the obstacle to lead to a position; then there is no task.
 
     Raises:
         InputError: Something that this kind does not take, or lacks.
@@ -58,12 +66,18 @@ class RunRequest:
     """
 
     kind: str
-    tasks: tuple[str, ...]
+    tasks: tuple[str, ...] = ()
     level: float | None = None
     duration: float | None = None
     position: tuple[float, ...] | None = None
     orientation: tuple[float, ...] | None = None
     kp: float | None = None
+    obstacle: str | None = None
+
+    @property
+    def about(self) -> str:
+        """What it is about, in words."""
+        return " and ".join(self.tasks) if self.obstacle is None else self.obstacle
 
     def __post_init__(self) -> None:
         if not isinstance(self.kind, str) or self.kind not in KINDS:
@@ -71,14 +85,19 @@ class RunRequest:
         if isinstance(self.tasks, str) or not all(isinstance(name, str) for name in self.tasks):
             raise InputError(f"request {self.kind!r}: tasks must be names, not {self.tasks!r}")
         self._convert()
-        many = 2 if self.kind == "swap" else 1
+        many = _TASKS.get(self.kind, 1)
         if len(self.tasks) != many:
             raise InputError(f"request {self.kind!r} takes {many} task(s), not {list(self.tasks)}")
         given = {f.name for f in fields(self)[2:] if getattr(self, f.name) is not None}
         if wrong := sorted(given - KINDS[self.kind]):
             raise InputError(f"request {self.kind!r} does not take {', '.join(wrong)}")
-        if (needed := _NEEDED.get(self.kind)) and needed not in given:
-            raise InputError(f"request {self.kind!r} needs {needed}")
+        for needed in _NEEDED.get(self.kind, ()):
+            if needed not in given:
+                raise InputError(f"request {self.kind!r} needs {needed}")
+        if self.obstacle is not None and not isinstance(self.obstacle, str):
+            raise InputError(
+                f"request {self.kind!r}: obstacle must be a name, not {self.obstacle!r}"
+            )
 
     def _convert(self) -> None:
         """Turn what was given into plain numbers, or refuse it."""
@@ -127,9 +146,11 @@ class RunRequest:
 
     def replaces(self, other: RunRequest) -> bool:
         """Whether nothing of another request is left when this one is done."""
-        if self.kind not in ("lead", "gain") or (self.kind, self.tasks) != (
+        mine = self.kind, self.tasks, self.obstacle
+        if self.kind not in ("lead", "gain", "place") or mine != (
             other.kind,
             other.tasks,
+            other.obstacle,
         ):
             return False
         return self.plain().keys() >= other.plain().keys()
@@ -192,6 +213,9 @@ class Changes:
             OpspaceError: It cannot be done.
         """
         stack = self._controller.stack
+        if request.kind == "place":
+            self._place(request, t)
+            return
         task = self._task(request.tasks[0])
         duration = 0.5 if request.duration is None else request.duration
         match request.kind:
@@ -225,6 +249,14 @@ class Changes:
         task.kp = kp
         task.kp = start
         self._ramps[task.name] = _GainRamp(start, kp, t, duration)
+
+    def _place(self, request: RunRequest, t: float) -> None:
+        guard = self._controller.collisions
+        if guard is None:
+            raise InputError("this controller keeps away from nothing: it has no obstacles")
+        assert request.obstacle is not None
+        assert request.position is not None
+        guard[request.obstacle].lead(request.position, t)
 
     def _task(self, name: str) -> Task:
         try:

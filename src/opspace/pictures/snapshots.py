@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from opspace.errors import InputError, ModelError, missing_extra
+from opspace.pictures.obstacles_drawn import Drawn, draw_obstacles
 from opspace.pictures.offscreen import (
     Canvas,
     SnapshotUnavailableError,
@@ -24,6 +25,7 @@ from opspace.pictures.offscreen import (
 from opspace.record import Recording
 from opspace.robots.adapter import spread_of
 from opspace.robots.protocol import Robot
+from opspace.tasks.obstacles import Obstacle, Placing
 
 try:
     import mujoco
@@ -54,6 +56,7 @@ class _Tick(NamedTuple):
     qpos: np.ndarray
     target: np.ndarray | None
     trail: np.ndarray
+    obstacles: list[tuple[Obstacle, Placing]]
 
 
 def snapshots(
@@ -67,7 +70,7 @@ def snapshots(
 ) -> list[np.ndarray]:
     """Render the robot at several times of a run, all from the same place.
 
-    The desired position is a sphere and the way of the tool so far a line.
+    The desired position is a sphere, the way of the tool so far a line; obstacles are where they were.
 
     Args:
         recording: The run, with columns ``q/<joint>`` and ``tool/x`` to ``tool/z``.
@@ -204,7 +207,7 @@ def _ticks(
     error = [f"tasks/{task}/error/{i}" for i in range(3)]
     aimed = all(name in recording for name in error)
     t, tool = recording.t, np.column_stack([recording[f"tool/{axis}"] for axis in "xyz"])
-    ticks = []
+    ticks, drawn = [], Drawn(recording)
     for row in (_nearest(t, time) for time in times):
         found, qpos = recording.row(row), np.array(model.qpos0)
         for start, stop, names in coordinates:
@@ -213,7 +216,7 @@ def _ticks(
             qpos = spread.positions(np.array([found[f"q/{name}"] for name in robot.joint_names]))
         target = tool[row] + [found[name] for name in error] if aimed else None
         shown = np.linspace(0, row, min(row + 1, _TRAIL_POINTS)).astype(int)
-        ticks.append(_Tick(qpos, target, tool[shown]))
+        ticks.append(_Tick(qpos, target, tool[shown], drawn.at(row)))
     return ticks
 
 
@@ -272,6 +275,7 @@ def _corners(model: mujoco.MjModel, data: mujoco.MjData, qpos: np.ndarray) -> np
 
 def _draw(drawing: Canvas, data: mujoco.MjData, tick: _Tick, view: View) -> None:
     drawing.show(data, view)
+    draw_obstacles(drawing, tick.obstacles)
     for start, end in pairwise(tick.trail):
         radius, shape = 0.003 * view.distance, mujoco.mjtGeom.mjGEOM_CAPSULE
         geom = drawing.add(shape, start, radius, TRAIL_COLOR)

@@ -38,6 +38,7 @@ BOUNDS = RecordTable(
     ),
     _work("bound", (_BOUNDS,), "the bounds", "√J/s"),
     _work("softness", (_BOUNDS,), "their softness"),
+    _work("scale", (_BOUNDS,), "the numbers that say whether each is broken", "√J/s"),
     _work("multiplier", (_BOUNDS,), "multipliers of the bounds", "√J/s"),
     _work("wanted", (_BOUNDS,), "multipliers of those that hold, if alone", "√J/s"),
     _work("active", (_BOUNDS,), "the bounds that hold", dtype=_INT),

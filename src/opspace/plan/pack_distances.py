@@ -8,6 +8,7 @@ from opspace.machine.field_table import Record
 from opspace.robots.motion_axes import FramePlace, MotionAxes
 from opspace.tasks.collision_avoidance import CollisionAvoidance
 from opspace.tasks.distance_layout import DistanceLayout
+from opspace.tasks.obstacles import Placing
 
 
 class PackedDistances:
@@ -21,12 +22,14 @@ class PackedDistances:
 
     Attributes:
         layout: The layout.
+        placings: Where the last tick found the obstacles.
     """
 
     def __init__(
         self, guard: CollisionAvoidance, layout: DistanceLayout, axes: MotionAxes, tick: Record
     ) -> None:
         self.layout = layout
+        self.placings: tuple[Placing, ...] = ()
         self._distances = d = tick.distances
         d.limits[:] = guard.margin, guard.k1, guard.k2, guard.brake
         d.row[:] = layout.rows
@@ -52,10 +55,10 @@ class PackedDistances:
 
     def refresh(self, t: float) -> None:
         """Bring the obstacles up to date at a time, s."""
-        d, obstacles = self._distances, self.layout.obstacles
-        for i, obstacle in enumerate(obstacles, d.set_local.shape[0] - len(obstacles)):
-            R, p, velocity = obstacle.placing(t)
+        d, placings = self._distances, self.layout.placings(t)
+        for i, (R, p, velocity) in enumerate(placings, d.set_local.shape[0] - len(placings)):
             d.set_local[i, :9], d.set_local[i, 9:], d.twist[i] = R.T.reshape(9), p, velocity
+        self.placings = placings
 
 
 def _on_body(

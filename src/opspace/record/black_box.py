@@ -20,9 +20,16 @@ from opspace.controller.wrenches import Wrenches
 from opspace.errors import InputError, OpspaceError, RecordingError
 from opspace.record.format import Ended
 from opspace.record.observer import STATUS, state_columns
+from opspace.record.obstacle_columns import (
+    HEADER_KEY,
+    about_collisions,
+    columns_of_obstacles,
+    row_of_placings,
+)
 from opspace.record.wrench_columns import Given, columns_of_wrenches, row_of_wrenches
 from opspace.record.writer import Recorder
 from opspace.robots import Robot
+from opspace.tasks.obstacles import Placing
 
 FAILURES = Status.FAULT | Status.LIMIT_LOST | Status.COLLISION_LOST
 """What is written down by itself; a tick that raises always is."""
@@ -38,8 +45,8 @@ FIRST = "first"
 FAILURE = "failure"
 
 _both = int.__and__  # that of flags is Python's and slow
-_Tick = tuple[float, bytes, bytes, bytes, int, Given]
-"""t, q, v, τ, status and wrenches of a tick."""
+_Tick = tuple[float, bytes, bytes, bytes, int, Given, Mapping[str, Placing]]
+"""t, q, v, τ, status, wrenches and obstacles of a tick."""
 
 
 class BlackBox:
@@ -127,9 +134,9 @@ class BlackBox:
         # Bytes are copied quicker than rows of an array are written; the robot holds the state as
         # the controller took it.
         robot, status = self._robot, command.status
-        given = self._controller.wrenches
+        given, placings = self._controller.wrenches, self._controller.placings
         state = robot.q.tobytes(), robot.v.tobytes()
-        self._kept.append((t, *state, command.tau.tobytes(), status, given))
+        self._kept.append((t, *state, command.tau.tobytes(), status, given, placings))
         self._seen += 1
         if self._first is None:
             self._first = {"t": float(t), "q": robot.q.tolist(), "v": robot.v.tolist()}
@@ -161,7 +168,7 @@ class BlackBox:
             str(name): None if wrench is None else _numbers(wrench, 6)
             for name, wrench in (wrenches or {}).items()
         }
-        self._kept.append((when, *state, torque, 0, given))
+        self._kept.append((when, *state, torque, 0, given, self._controller.placings))
         self._seen += 1
 
     def _failed(self, kind: str, reason: str, command: Command | None) -> None:
@@ -192,11 +199,19 @@ class BlackBox:
             FAILURE: {"kind": kind, "row": len(kept) - 1},
             "tasks": _tasks(command if command is not None and command.tasks else before),
         }
-        sensors = tuple(sorted({name for tick in kept for name in tick[-1]}))
-        columns = [*state_columns(self.robot), STATUS, *columns_of_wrenches(sensors)]
+        if self._controller.collisions is not None:
+            header[HEADER_KEY] = about_collisions(self._controller.collisions)
+        sensors = tuple(sorted({name for tick in kept for name in tick[-2]}))
+        obstacles = tuple(dict.fromkeys(name for tick in kept for name in tick[-1]))
+        columns = [
+            *state_columns(self.robot),
+            STATUS,
+            *columns_of_wrenches(sensors),
+            *columns_of_obstacles(obstacles),
+        ]
         try:
             with Recorder(path, columns, header) as recorder:
-                recorder.extend(_rows(kept, sensors))
+                recorder.extend(_rows(kept, sensors, obstacles))
                 recorder.close(ended, reason)
         except OpspaceError as error:
             warnings.warn(f"the black box could not be written: {error}", stacklevel=1)
@@ -210,14 +225,16 @@ def _numbers(values: ArrayLike | float, size: int) -> np.ndarray:
         return np.full(size, np.nan)
 
 
-def _rows(kept: Sequence[_Tick], sensors: Sequence[str]) -> np.ndarray:
+def _rows(kept: Sequence[_Tick], sensors: Sequence[str], obstacles: Sequence[str]) -> np.ndarray:
     """Write ticks as rows of a recording."""
-    t, q, v, tau, status, given = zip(*kept, strict=True)
+    t, q, v, tau, status, given, placings = zip(*kept, strict=True)
     groups = [np.frombuffer(b"".join(group)).reshape(len(kept), -1) for group in (q, v, tau)]
+    more: list[list[np.ndarray]] = []
     if sensors:
-        wrenches = [np.concatenate(row_of_wrenches(tick, sensors)) for tick in given]
-        return np.column_stack([t, *groups, status, wrenches])
-    return np.column_stack([t, *groups, status])
+        more.append([np.concatenate(row_of_wrenches(tick, sensors)) for tick in given])
+    if obstacles:
+        more.append([np.concatenate(row_of_placings(tick, obstacles)) for tick in placings])
+    return np.column_stack([t, *groups, status, *more])
 
 
 def _tasks(command: Command | None) -> dict[str, Any]:

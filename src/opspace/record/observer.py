@@ -11,6 +11,7 @@ from opspace.command import Command, LevelStatus, TaskStatus
 from opspace.controller import ReferenceController
 from opspace.errors import InputError
 from opspace.record.format import Column, Ended
+from opspace.record.obstacle_columns import CollisionRows, columns_of_collisions
 from opspace.record.subject import subject_of
 from opspace.record.wrench_columns import (
     columns_of_touches,
@@ -102,10 +103,7 @@ def columns_of(
             for side in stack.limits.sides
         ]
     if controller.collisions is not None:
-        columns += [
-            Column("distances/least", "m", "distance of the nearest pair that is kept apart"),
-            Column("distances/taken", "m/s²", "the most that a pair slows down its approach"),
-        ]
+        columns += columns_of_collisions(controller.collisions)
     recorded = [*stack, *tasks]
     return [
         *columns,
@@ -165,6 +163,8 @@ class TickRecorder:
         self._levels = {number: _directions(controller, level) for number, level in levels.items()}
         self._sensors = sensors_of(list(self._tasks.values()))
         self._truth = truth
+        guard = controller.collisions
+        self._apart = None if guard is None else CollisionRows(controller, guard)
         columns = columns_of(controller, tasks, levels)
         if truth is not None:
             columns += _truth_columns(controller)
@@ -192,10 +192,8 @@ class TickRecorder:
             # Worked out anew each time it is asked for.
             limits = command.limits
             parts.append([limits.get(s.name, 0.0) for s in controller.stack.limits.sides])
-        if controller.collisions is not None:
-            apart = command.distances.values()
-            least = min((pair.distance for pair in apart), default=np.inf)
-            parts.append([least, max((pair.taken for pair in apart), default=0.0)])
+        if self._apart is not None:
+            parts += self._apart.row(command.distances)
         parts += row_of_wrenches(controller.wrenches, self._sensors)
         parts += row_of_touches(list(self._tasks.values()))
         parts.append([float(command.hard_solves), float(command.status)])

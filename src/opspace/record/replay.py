@@ -12,6 +12,7 @@ from opspace.command import Command, Status
 from opspace.controller import ReferenceController
 from opspace.errors import OpspaceError, RecordingError
 from opspace.record.black_box import FIRST
+from opspace.record.obstacle_columns import ObstaclePlayer
 from opspace.record.reader import Recording, load
 from opspace.record.wrench_columns import Given, recorded_wrenches
 
@@ -53,7 +54,8 @@ def replay(
     """Replay a recording with a controller that has not run yet.
 
     Every recorded state goes to the controller, at its time and in its order, so a failure shows
-    itself again at the same tick. Of a `opspace.BlackBox` the first tick ever goes before them.
+    itself again at the same tick; obstacles are where they were, to the last bit. Of a
+    `opspace.BlackBox` the first tick ever goes before them.
     Requests and handovers of the run are those that the controller has been given before.
 
     Args:
@@ -73,11 +75,14 @@ def replay(
     rows = _rows(recording, controller)
     found = Replay(len(recording), f"{recording.ended.how} {recording.ended.reason}".strip())
     _begin(recording, controller)
-    for t, q, v, tau, _, wrenches in rows[:-1]:
+    obstacles = ObstaclePlayer(recording, controller)
+    for i, (t, q, v, tau, _, wrenches) in enumerate(rows[:-1]):
+        obstacles.put(i)
         command = controller.step(t, q, v, wrenches=wrenches)
         observe(q, v, command)
         _compare(found, t, command, tau)
     if rows:
+        obstacles.put(len(rows) - 1)
         _last(found, rows[-1], controller)
     _in_seconds(found, recording)
     return found

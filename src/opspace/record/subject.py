@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from opspace.controller import ReferenceController
+from opspace.record.obstacle_columns import HEADER_KEY, about_collisions
 from opspace.robots.adapter import added_frames, held_joints
 from opspace.robots.catalogue import CATALOGUE, locate
 from opspace.robots.joint_units import joint_units
@@ -30,7 +31,8 @@ def subject_of(controller: ReferenceController, tasks: Sequence[Task] = ()) -> d
         ``robot`` (name or file, joints, their units and limits in rad or m, torque limits, the buffer
         before a limit in rad or m, and by limit the acceleration that its joint brakes with; null
         where there is none) and ``tasks`` (units, stiffness, level, and what its target can be led
-        to).
+        to); ``collisions``, see
+        `opspace.record.obstacle_columns.about_collisions`, where something is kept apart.
     """
     stack = controller.stack
     found = {
@@ -39,7 +41,10 @@ def subject_of(controller: ReferenceController, tasks: Sequence[Task] = ()) -> d
         for task in level
     }
     found.update({task.name: _task(task, None) for task in tasks})
-    return {"robot": _robot(controller), "tasks": found}
+    about = {"robot": _robot(controller), "tasks": found}
+    if controller.collisions is not None:
+        about[HEADER_KEY] = about_collisions(controller.collisions)
+    return about
 
 
 def _robot(controller: ReferenceController) -> dict[str, Any]:

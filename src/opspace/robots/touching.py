@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import combinations
 from typing import NamedTuple
 
@@ -17,6 +17,10 @@ POSTURES = 1000
 
 ALWAYS = 0.95
 """Links that overlap in more of the postures than this are built so."""
+
+OFTEN = 0.4
+"""Of links that are within the margin in more of the postures than this capsules cannot tell where they
+touch: such a pair would be at its bound wherever the arm goes."""
 
 NEAR = 0.05
 """Links that never come nearer than this need not be watched, m."""
@@ -34,17 +38,25 @@ class Pairs(NamedTuple):
     left_out: dict[tuple[str, str], str]
 
 
-def pairs_of(robot: Robot, shapes: Sequence[LinkCapsule], margin: float) -> Pairs:
+def pairs_of(
+    robot: Robot,
+    shapes: Sequence[LinkCapsule],
+    margin: float,
+    disabled: Mapping[frozenset[str], str] | None = None,
+) -> Pairs:
     """Choose the pairs of links that can collide and do not always.
 
     Left out are links with at most one joint between them, links that are nearer than the margin in the
     reference posture, and by what random postures inside the joint limits show, links that overlap
-    nearly always and links that never come near each other.
+    nearly always, links that are within the margin so often that their capsules are too coarse for
+    them, and links that never come near each other.
 
     Args:
         robot: The robot; it is not changed.
         shapes: Its capsules.
         margin: Distance that is to be kept, m.
+        disabled: Pairs that somebody has chosen to leave out, with reasons; then random postures
+            leave out none.
 
     Returns:
         The pairs.
@@ -58,6 +70,9 @@ def pairs_of(robot: Robot, shapes: Sequence[LinkCapsule], margin: float) -> Pair
         if len(moved[one] ^ moved[two]) <= 1:
             left_out[one, two] = "at most one joint between them"
             continue
+        if disabled is not None and (why := disabled.get(frozenset((one, two)))):
+            left_out[one, two] = f"disabled: {why}"
+            continue
         gap = np.min(
             [
                 segment_distance(placed[i], placed[j]) - shapes[i].radius - shapes[j].radius
@@ -67,7 +82,7 @@ def pairs_of(robot: Robot, shapes: Sequence[LinkCapsule], margin: float) -> Pair
             ],
             axis=0,
         )
-        reason = _reason(gap, margin)
+        reason = _near(gap, margin) if disabled is not None else _reason(gap, margin)
         if reason:
             left_out[one, two] = reason
         else:
@@ -75,14 +90,58 @@ def pairs_of(robot: Robot, shapes: Sequence[LinkCapsule], margin: float) -> Pair
     return Pairs(tuple(kept), left_out)
 
 
+def carried_pairs(
+    robot: Robot, shapes: Sequence[LinkCapsule], carried: Sequence[LinkCapsule], margin: float
+) -> tuple[tuple[str, str], ...]:
+    """Choose the links that something on one frame is to be kept from.
+
+    Args:
+        robot: The robot; it is not changed, and its state is where the thing has been taken.
+        shapes: The capsules of its links.
+        carried: Those of the thing, all on one frame.
+        margin: Distance that is to be kept, m.
+
+    Returns:
+        Links with more than one joint between that are not within the margin now, each with the frame.
+    """
+    frame = carried[0].frame
+    links = list(dict.fromkeys(shape.frame for shape in shapes))
+    moved = joints_that_move(robot, [*links, frame])
+    probe = robot.fresh()
+    probe.update(robot.q, np.zeros(robot.nv))
+    found: list[tuple[str, str]] = []
+    for link, joints in zip(links, moved, strict=False):
+        if len(joints ^ moved[-1]) <= 1:
+            continue
+        near = min(
+            float(segment_distance(_ends(probe, one)[None], _ends(probe, two)[None])[0])
+            - one.radius
+            - two.radius
+            for one in shapes
+            if one.frame == link
+            for two in carried
+        )
+        if near >= margin:
+            found.append((link, frame))
+    return tuple(found)
+
+
 def _reason(gap: np.ndarray, margin: float) -> str:
     if np.mean(gap < 0.0) > ALWAYS:
         return f"they overlap in {100.0 * np.mean(gap < 0.0):.0f} % of all postures"
-    if gap[0] < margin:
-        return f"{1e3 * gap[0]:.0f} mm apart in the reference posture"
+    if near := _near(gap, margin):
+        return near
+    if np.mean(gap < margin) > OFTEN:
+        return (
+            f"within {1e3 * margin:g} mm in {100.0 * np.mean(gap < margin):.0f} % of all postures"
+        )
     if np.min(gap) > NEAR + margin:
         return f"never nearer than {1e3 * np.min(gap):.0f} mm"
     return ""
+
+
+def _near(gap: np.ndarray, margin: float) -> str:
+    return f"{1e3 * gap[0]:.0f} mm apart in the reference posture" if gap[0] < margin else ""
 
 
 def _placed(robot: Robot, shapes: Sequence[LinkCapsule]) -> np.ndarray:
@@ -94,7 +153,7 @@ def _placed(robot: Robot, shapes: Sequence[LinkCapsule]) -> np.ndarray:
     rng = np.random.default_rng(0)
     reach = np.minimum(robot.q_upper - robot.q_lower, 2.0 * math.pi)
     middle = np.where(np.isfinite(robot.q_lower), robot.q_lower, -math.pi) + 0.5 * reach
-    single = robot.actuated & np.isfinite(robot.q_lower + robot.q_upper)
+    single = robot.actuated & np.isfinite(robot.q_lower) & np.isfinite(robot.q_upper)
     straight = robot.nq == robot.nv
     start = np.zeros(robot.nv)
     probe.update(robot.q_reference, still)

@@ -21,6 +21,7 @@ from opspace.tasks.obstacles import Box as Box
 from opspace.tasks.obstacles import Capsule as Capsule
 from opspace.tasks.obstacles import HalfSpace as HalfSpace
 from opspace.tasks.orientation import OrientationTask as OrientationTask
+from opspace.tasks.other_robot import OtherRobot as OtherRobot
 from opspace.tasks.pose import PoseTask as PoseTask
 from opspace.tasks.position import PositionTask as PositionTask
 from opspace.tasks.posture import PostureTask as PostureTask

@@ -6,13 +6,16 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
+from types import MappingProxyType
 
 import numpy as np
 
 from opspace.command import Distance
 from opspace.robots.protocol import Robot
 from opspace.robots.shapes import LinkCapsule
-from opspace.tasks.obstacles import Obstacle
+from opspace.tasks.obstacles import Obstacle, Placing
+
+NOTHING_TOUCHES: Mapping[str, frozenset[str]] = MappingProxyType({})
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,6 +52,14 @@ class DistanceLayout:
     pairs: tuple[str, ...]
     pair: np.ndarray
 
+    def placings(self, t: float) -> tuple[Placing, ...]:
+        """Ask every obstacle where it is at time t, s."""
+        return tuple(obstacle.placing(t) for obstacle in self.obstacles)
+
+    def by_name(self, placings: Sequence[Placing]) -> dict[str, Placing]:
+        """Give what `placings` tells the names of the obstacles."""
+        return {o.name: placing for o, placing in zip(self.obstacles, placings, strict=True)}
+
     def status(self, distance: np.ndarray, taken: np.ndarray) -> dict[str, Distance]:
         """Tell of every pair of bodies how near it is and how much it acts, the nearest first.
 
@@ -69,6 +80,7 @@ def lay_out(
     moved: Mapping[str, frozenset[int]],
     pairs: Sequence[tuple[str, str]],
     obstacles: tuple[Obstacle, ...],
+    touches: Mapping[str, frozenset[str]] = NOTHING_TOUCHES,
 ) -> DistanceLayout:
     """Cover the links with balls, and pair these with the sets that they are to keep away from.
 
@@ -78,14 +90,15 @@ def lay_out(
         moved: Joints that move each link, by frame.
         pairs: Links that are kept apart.
         obstacles: The obstacles.
+        touches: Names of the obstacles that a link may touch, by frame, beside what these say.
     """
     covers = [shape.balls() for shape in shapes]
     of_shape = np.repeat(np.arange(len(covers)), [len(balls) for balls, _ in covers])
-    places = [_along(shape) for shape in shapes]
+    places = [along(shape) for shape in shapes]
     frames = np.array([robot.frame_id(shape.frame) for shape in shapes], np.int64)
     halves = np.array([(0.0, 0.0, half) for *_, half in places]).reshape(-1, 3)
     lower, upper = ([getattr(o, side) for o in obstacles] for side in ("lower", "upper"))
-    names, rows = _rows(shapes, of_shape, moved, pairs, obstacles)
+    names, rows = _rows(shapes, of_shape, moved, pairs, obstacles, touches)
     extra = len(obstacles)
     return DistanceLayout(
         obstacles,
@@ -110,6 +123,7 @@ def _rows(
     moved: Mapping[str, frozenset[int]],
     pairs: Sequence[tuple[str, str]],
     obstacles: Sequence[Obstacle],
+    touches: Mapping[str, frozenset[str]],
 ) -> tuple[tuple[str, ...], np.ndarray]:
     """Name the pairs of bodies, and give the ball, set and pair of every row."""
     parts: dict[str, list[int]] = {}
@@ -131,14 +145,16 @@ def _rows(
         names.append(f"{one}/{two}")
     for k, obstacle in enumerate(obstacles, len(shapes)):
         for frame, joints in moved.items():
-            if joints and frame not in obstacle.ignore:
+            if frame not in parts or not joints:
+                continue
+            if frame not in obstacle.ignore and obstacle.name not in touches.get(frame, ()):
                 for i in parts[frame]:
                     keep(i, k)
                 names.append(f"{frame}/{obstacle.name}")
     return tuple(names), np.array(rows, np.int64).reshape(-1, 3)
 
 
-def _along(shape: LinkCapsule) -> tuple[np.ndarray, np.ndarray, float]:
+def along(shape: LinkCapsule) -> tuple[np.ndarray, np.ndarray, float]:
     """Axes with z along a capsule, its middle and half its length, m."""
     start, end = np.array(shape.start), np.array(shape.end)
     length = float(np.linalg.norm(end - start))

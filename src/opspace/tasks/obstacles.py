@@ -3,21 +3,26 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from types import MappingProxyType
 from typing import Any, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from opspace.errors import InputError
-from opspace.tasks.references.sample import Reference
+from opspace.tasks.references.sample import Reference, Sample
 from opspace.tasks.rotation import as_rotation
 from opspace.tasks.task import CHANGES
 from opspace.tasks.validation import Array, finite_array, numbers, positive
+from opspace.tasks.ways import Pace, VectorWay
 
 _NONE = np.zeros(3)
 _STILL = np.zeros(6)
 _UPRIGHT = np.eye(3)
+
+LED = Pace(0.3, 1.0)
+"""Limits of an obstacle that is led, m/s, m/s². An acceleration a costs a/(k₁k₂) of the margin."""
 
 
 class Placing(NamedTuple):
@@ -32,6 +37,9 @@ class Placing(NamedTuple):
     rotation: Array
     position: Array
     velocity: Array
+
+
+NO_PLACINGS: Mapping[str, Placing] = MappingProxyType({})
 
 
 class Obstacle:
@@ -141,6 +149,35 @@ class Obstacle:
             _STILL if velocity is None else velocity,
             here.position,
         )
+        CHANGES.last = object()
+
+    def lead(self, goal: ArrayLike, t: float) -> None:
+        """Let it go from where it is to another place, within `LED`, so that what follows it can stop.
+
+        The way begins as it moves at time ``t``, so it may be asked for again and again, as a hand that
+        drags an obstacle does.
+
+        Args:
+            goal: (3,) where its origin goes, m.
+            t: Time of the present tick, s.
+
+        Raises:
+            InputError: A wrong shape or a number that is not finite.
+        """
+        end = finite_array(goal, (3,), f"the goal of {self.name!r}")
+        here, path = self._state
+        now = Sample(here.position, here.velocity[:3], _NONE)
+        if isinstance(path, VectorWay):
+            now = path(t)
+        self.place(VectorWay(now, end, t, LED))
+
+    def put_back(self, placing: Placing) -> None:
+        """Let it be exactly where a tick found it, to the last bit, whatever it follows.
+
+        Args:
+            placing: What `placing` gave.
+        """
+        self._state = placing, None
         CHANGES.last = object()
 
     def _told(

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from opspace.errors import InputError
 from opspace.record.growing import GrowingRecording
+from opspace.record.obstacle_columns import GROUP, HEADER_KEY, PARTS, placing_of
+from opspace.tasks.obstacles import Placing
 
 
 @dataclass(frozen=True)
@@ -63,6 +66,7 @@ class Frame:
         levels: The levels, most important first.
         limits: Activation of the joint limits by name.
         status: Flags of the command.
+        obstacles: Where obstacles are, by name, those that are there.
     """
 
     t: float
@@ -73,6 +77,7 @@ class Frame:
     levels: tuple[LevelFrame, ...]
     limits: dict[str, float]
     status: int
+    obstacles: Mapping[str, Placing] = field(default_factory=dict[str, Placing])
 
 
 class FrameReader:
@@ -97,6 +102,11 @@ class FrameReader:
         )
         limits = recording.group("limits")
         self._limits = {name.removeprefix("limits/"): recording.index[name] for name in limits}
+        self._obstacles = {
+            name: recording.columns([f"{GROUP}/{name}/{part}" for part in PARTS])
+            for name in recording.header.get(HEADER_KEY, {}).get("obstacles", {})
+            if recording.group(f"{GROUP}/{name}")
+        }
         self._tasks = {name: self._task(name) for name in recording.header["tasks"]}
         self._levels = {float(name): self._level(name) for name in _levels(recording)}
 
@@ -131,6 +141,11 @@ class FrameReader:
             ),
             limits={name: float(values[place]) for name, place in self._limits.items()},
             status=int(values[self._status]),
+            obstacles={
+                name: placing_of(values[part])
+                for name, part in self._obstacles.items()
+                if not np.isnan(values[part[0]])
+            },
         )
 
     def row_at(self, t: float) -> int:

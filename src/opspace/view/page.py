@@ -13,6 +13,7 @@ from typing import Any
 
 from opspace.errors import InputError, ModelWarning, missing_extra
 from opspace.record.growing import GrowingRecording
+from opspace.record.obstacle_columns import HEADER_KEY
 from opspace.robots import Robot, load_robot
 from opspace.robots.joint_units import effort_unit
 
@@ -23,7 +24,9 @@ except ImportError:
 
 from opspace.view import panels
 from opspace.view.charts import Chart, sigma_columns, torque_columns
+from opspace.view.collision_scene import CollisionScene
 from opspace.view.controls import Ask, RunControls, StackControls
+from opspace.view.distance_panel import distances
 from opspace.view.frame import FrameReader
 from opspace.view.scene import RobotScene
 
@@ -66,9 +69,14 @@ class Page:
             self._server = viser.ViserServer(host, port, label="opspace", verbose=False)
         self._controls: StackControls | None = None
         self._build(directory, ask)
+        robot = _robot(self._about["robot"])
+        self._apart: CollisionScene | None = None
+        if (guard := self._about.get(HEADER_KEY)) is not None:
+            move = None if ask is None else self._move
+            self._apart = CollisionScene(self._server, robot, guard, move)
         self._scene = RobotScene(
             self._server,
-            _robot(self._about["robot"]),
+            robot,
             self._about["tasks"],
             None if ask is None else self._drag,
         )
@@ -135,6 +143,10 @@ class Page:
         trail = self._reader.history(row, _TRAIL_SECONDS, 80, tool)[:, 1:]
         live = self._ask is not None and self._run.follows
         self._scene.show(frame, trail, live)
+        if self._apart is not None:
+            self._apart.shapes_shown = self._shapes_shown.value
+            gaps = self._apart.show(frame, live)
+            self._distances.content = distances(gaps, self._apart.margin)
         self._head.content = panels.head(frame, self._note(live))
         self._bars.content = panels.tasks(frame)
         if now - self._charted >= 1.0 / CHARTS or self._run.paused:
@@ -169,6 +181,11 @@ class Page:
                 self._controls = StackControls(self._server, ask, self._about["tasks"], homes)
         with tabs.add_tab("Joints"):
             self._joints = gui.add_html("")
+        if HEADER_KEY in self._about:
+            with tabs.add_tab("Distances"):
+                self._shapes_shown = gui.add_checkbox("Shapes of the links", False)
+                self._distances = gui.add_html("")
+            self._shapes_shown.on_update(lambda event: self._draw_anew())
         self._chart_tab = tabs.add_tab("Charts")
         self._charts: list[Chart] = []
 
@@ -182,6 +199,15 @@ class Page:
             shown["weakest σ of a level [1], 0 without one, over time [s]"] = weakest
         with self._chart_tab:
             return [Chart(self._server, reader, title, names) for title, names in shown.items()]
+
+    def _draw_anew(self) -> None:
+        """Let the next picture be drawn although it shows the same tick."""
+        self._shown = None
+
+    def _move(self, obstacle: str, position: tuple[float, ...]) -> None:
+        if self._ask is not None:
+            request = {"kind": "place", "obstacle": obstacle, "position": list(position)}
+            self._ask({"request": request})
 
     def _drag(self, task: str, place: dict[str, tuple[float, ...]]) -> None:
         if self._ask is not None:

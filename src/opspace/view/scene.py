@@ -14,16 +14,11 @@ from opspace.robots.protocol import Robot
 from opspace.robots.visuals import visuals_of
 from opspace.tasks.rotation import exp_rotation, quaternion_from_matrix
 from opspace.view.frame import Frame, LevelFrame, TaskFrame
+from opspace.view.handle import DRAG_PERIOD, STAYS
 from opspace.view.panels import blend_rgb
 
 Dragged = Callable[[str, dict[str, tuple[float, ...]]], None]
 """Takes the name of a task and where its target was dragged to."""
-
-DRAG_PERIOD = 0.05
-"""Seconds between two requests while a target is being dragged."""
-
-STAYS = 3.0
-"""Seconds that a handle stays where it was dragged to; then it follows the target again."""
 
 _LENGTH = 0.16
 _ARC = np.linspace(0.0, 1.5 * math.pi, 25)

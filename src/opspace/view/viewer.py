@@ -149,7 +149,7 @@ class Viewer:
             self._pacing.resume()
 
     def _answer(self, request: RunRequest, reason: str) -> None:
-        what = f"{request.kind} {' and '.join(request.tasks)}"
+        what = f"{request.kind} {request.about}"
         self._page.say({"answer": what, "reason": reason})
 
     def _hear(self, message: Mapping[str, Any]) -> None:

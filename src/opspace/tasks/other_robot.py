@@ -1,0 +1,108 @@
+"""Another robot in the same workspace: its links are obstacles that move as it does."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from opspace.errors import InputError
+from opspace.robots.protocol import Robot
+from opspace.robots.shapes import LinkCapsule, shapes_of
+from opspace.tasks.collision_avoidance import wanted_shapes
+from opspace.tasks.distance_layout import along
+from opspace.tasks.obstacles import Ball, Capsule, Obstacle
+from opspace.tasks.rotation import as_rotation
+from opspace.tasks.validation import finite_array
+
+
+class OtherRobot:
+    """The links of a robot as obstacles for another one, with their velocities.
+
+    Hand `obstacles` to the other's `opspace.CollisionAvoidance`, and call `follow` with what this robot
+    does, from any thread. Each of two arms may avoid the other in this way, as the last line of
+    defence: each takes the other for something that goes on as it moves.
+
+    Args:
+        robot: The robot; it is not changed.
+        position: (3,) where its base is in the world of the robot that avoids it, m.
+        rotation: Axes of its base there, (3, 3) or quaternion wxyz.
+        shapes: Its shapes, as for `opspace.CollisionAvoidance`.
+        name: What the names of the obstacles begin with.
+        ignore: Links of the robot that avoids it which may touch it.
+
+    Raises:
+        InputError: Numbers that cannot be used.
+        ModelError: The robot's file has no shapes, or the file of shapes cannot be used.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        position: ArrayLike = (0.0, 0.0, 0.0),
+        rotation: ArrayLike = (1.0, 0.0, 0.0, 0.0),
+        *,
+        shapes: str | Path | Sequence[LinkCapsule] = "model",
+        name: str = "other",
+        ignore: Iterable[str] = (),
+    ) -> None:
+        self._position = finite_array(position, (3,), f"the position of {name!r}")
+        self._rotation = as_rotation(rotation, f"the rotation of {name!r}")
+        given, _ = wanted_shapes(shapes)
+        found = shapes_of(robot) if isinstance(given, str) else given
+        if not found:
+            raise InputError(f"{name!r} has no shapes")
+        self._robot = robot.fresh()
+        self._frames = [self._robot.frame_id(shape.frame) for shape in found]
+        self._places = [along(shape) for shape in found]
+        ignored = tuple(ignore)
+        self.obstacles: tuple[Obstacle, ...] = tuple(
+            _obstacle(shape, 2.0 * half, word, ignored)
+            for shape, (*_, half), word in zip(
+                found, self._places, _words(name, found), strict=True
+            )
+        )
+        self.follow(robot.q_reference, np.zeros(robot.nv))
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({self._robot.name!r}, {len(self.obstacles)} links)"
+
+    def follow(self, q: ArrayLike, v: ArrayLike) -> None:
+        """Put the links where they are now; the next tick of the other robot sees it.
+
+        Args:
+            q: (nq,) configuration, rad.
+            v: (n,) velocity, rad/s.
+
+        Raises:
+            InputError: A wrong size or a number that is not finite.
+        """
+        robot, base = self._robot, self._rotation
+        robot.update(finite_array(q, (robot.nq,), "q"), finite_array(v, (robot.nv,), "v"))
+        links = zip(self.obstacles, self._frames, self._places, strict=True)
+        for obstacle, frame, (axes, middle, _) in links:
+            R, twist = robot.rotation(frame), robot.velocity(frame)
+            arm = R @ middle
+            linear = base @ (twist[:3] + np.cross(twist[3:], arm))
+            obstacle.place(
+                self._position + base @ (robot.position(frame) + arm),
+                base @ R @ axes,
+                np.concatenate([linear, base @ twist[3:]]),
+            )
+
+
+def _obstacle(shape: LinkCapsule, length: float, name: str, ignore: tuple[str, ...]) -> Obstacle:
+    if length == 0.0:
+        return Ball(shape.radius, name=name, ignore=ignore)
+    return Capsule(shape.radius, length, name=name, ignore=ignore)
+
+
+def _words(name: str, shapes: Sequence[LinkCapsule]) -> list[str]:
+    """Name an obstacle after each shape; those of one frame are numbered."""
+    frames = [shape.frame for shape in shapes]
+    return [
+        f"{name}:{frame}" + (f":{frames[:i].count(frame) + 1}" if frames.count(frame) > 1 else "")
+        for i, frame in enumerate(frames)
+    ]
