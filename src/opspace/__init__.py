@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from opspace.errors import ModelWarning as ModelWarning
     from opspace.errors import OpspaceError as OpspaceError
     from opspace.errors import RecordingError as RecordingError
+    from opspace.errors import RobotStoppedError as RobotStoppedError
     from opspace.errors import ScenarioError as ScenarioError
     from opspace.errors import UnknownNameError as UnknownNameError
     from opspace.export.c_library import export_c as export_c
@@ -117,8 +118,8 @@ _NAMES = {
     "opspace.contacts": "GroundContact PointContact SoleContact",
     "opspace.controller": "Controller",
     "opspace.errors": (
-        "InputError MissingExtraError ModelError ModelWarning OpspaceError RecordingError ScenarioError "
-        "UnknownNameError"
+        "InputError MissingExtraError ModelError ModelWarning OpspaceError RecordingError "
+        "RobotStoppedError ScenarioError UnknownNameError"
     ),
     "opspace.export.c_library": "export_c",
     "opspace.law": (
