@@ -20,8 +20,6 @@ N = 6
 FACTS = DriverFacts(period=1e-3, gravity="robot", torque_rate=1000.0)
 
 
-
-
 @contextmanager
 def robot_apart(way, folder, *options):
     """Have a robot in another process; gives how to drive it, then what has happened to it."""
