@@ -48,7 +48,7 @@ class FakeRobot:
         if isinstance(trouble, float):
             self.clock += trouble
         q, v = self.plant.measure()
-        accepted = np.zeros(v.size) if self.accepted is None else self.accepted.copy()
+        accepted = None if self.accepted is None else self.accepted.copy()
         self._told = RobotState(self.plant.t + self.clock, q, v, accepted)
         return self._told
 

@@ -53,10 +53,16 @@ class Watcher:
         self.seen.append((command.t, command.tau))
 
 
+@pytest.mark.parametrize("torque_rate", [None, 1000.0])
 @pytest.mark.parametrize("gravity", ["controller", "robot"])
-def test_refuses_a_robot_that_holds_its_weight_the_other_way(gravity):
+def test_refuses_a_robot_that_holds_its_weight_the_other_way(gravity, torque_rate):
     controller, _ = arm(gravity)
-    driver = FakeRobot(controller.robot, gravity=gravity, adds_gravity=gravity == "controller")
+    driver = FakeRobot(
+        controller.robot,
+        gravity=gravity,
+        adds_gravity=gravity == "controller",
+        torque_rate=torque_rate,
+    )
     other = {"controller": "robot", "robot": "controller"}[gravity]
     with pytest.raises(osc.InputError, match=f"declare gravity='{other}'"):
         osc.Loop(controller, driver).run(1.0)

@@ -33,7 +33,8 @@ class SharedBlock:
     ==========  =============================================
     part        numbers
     ==========  =============================================
-    state       t, q (nq), v (n), τ (n) of the last command that was accepted
+    state       t, q (nq), v (n), τ (n) of the last command that was accepted, NaN before
+                the first
     command     τ (n)
     ==========  =============================================
 
@@ -168,7 +169,7 @@ class SharedMemoryDriver:
             return None
         self._seen = told
         q, v, tau = np.split(found[1:], [self._nq, self._nq + self._n])
-        return RobotState(float(found[0]), q, v, tau)
+        return RobotState(float(found[0]), q, v, None if np.isnan(tau[0]) else tau)
 
     def write(self, tau: np.ndarray) -> None:
         """Leave a torque for the robot."""

@@ -181,7 +181,8 @@ class SimulatedRobot:
     def _tell(self) -> bool:
         """Send a state; tell whether one arrives."""
         q, v = self._plant.measure()
-        self._there.send(RobotState(self._plant.t, q, v, self._accepted.copy()))
+        accepted = self._accepted.copy() if self._driven else np.full(v.size, np.nan)
+        self._there.send(RobotState(self._plant.t, q, v, accepted))
         arrived = self._there.arrivals()
         for state in arrived:
             assert isinstance(state, RobotState)
@@ -218,6 +219,8 @@ class SimulatedRobot:
             return
         self._silent = 0
         step = float(np.max(np.abs(command - self._accepted)))
+        # What a robot that holds itself does about its weight, nobody is told.
+        step = step if self._driven or self._adds else 0.0
         account.steepest = max(account.steepest, step / self._plant.dt)
         if step > self._most * (1.0 + 1e-9) or not np.all(np.isfinite(command)):
             account.reflexes += 1

@@ -38,7 +38,7 @@ class UdpDriver:
     ===========  ============================================  ===========================
 
     Numbers are little-endian doubles, SI and radians. The τ of a state is the last command that was
-    accepted, zeros before the first. Numbers begin anew at 0 after 2³² − 1. The robot must brake by
+    accepted, NaN before the first. Numbers begin anew at 0 after 2³² − 1. The robot must brake by
     itself when commands stay away.
 
     Args:
@@ -94,7 +94,7 @@ class UdpDriver:
         self._heard, self._number = True, number
         numbers = np.frombuffer(packet, DOUBLE, offset=HEAD.size)
         q, v, tau = np.split(numbers[1:], [self._nq, self._nq + self._n])
-        return RobotState(float(numbers[0]), q, v, tau)
+        return RobotState(float(numbers[0]), q, v, None if np.isnan(tau[0]) else tau)
 
     def write(self, tau: np.ndarray) -> None:
         """Answer the last state."""

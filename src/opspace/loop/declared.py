@@ -51,33 +51,40 @@ def check_declared(facts: DriverFacts, controller: ReferenceController) -> None:
 class HoldCheck:
     r"""Compares a robot that is commanded to hold still with one that bears its weight the other way.
 
-    Where the declaration is right, the commanded torque that holds leaves the robot at rest; where it
-    is wrong, by the weight too much or too little, the joints begin to move with
+    What is commanded, τ, and what the declaration says of gravity predict a motion, and the opposite
+    declaration another one, which differs by the whole weight:
 
-        q̈_w = ± M⁻¹ g
+        q̈ = M⁻¹ (τ + g_robot − g),     q̈_w − q̈ = ± M⁻¹ g
 
-    The part s = (Δv · q̈_w) / (Δt |q̈_w|²) of that motion is 0 in the first case and 1 in the second.
+    The part s = (Δv − ∫q̈) · M⁻¹ g / (± Δt |M⁻¹ g|²) of that difference which is seen is 0 where the
+    declaration is right and 1 where it is wrong. A command on its way up to what holds is no matter.
 
     Args:
         robot: The robot of the controller.
         facts: What the driver declares.
-        duration: How long a robot that moves too little to tell is watched, s.
+        duration: How long a robot that moves too little to tell is watched, s; 0 looks at nothing.
     """
 
     def __init__(self, robot: Robot, facts: DriverFacts, duration: float) -> None:
         self._robot, self._facts, self._duration = robot, facts, duration
+        self._adds = facts.gravity == "robot"
         self._first: RobotState | None = None
+        self._before = 0.0
+        self._predicted = np.zeros(robot.nv)
         self._wrong = np.zeros(robot.nv)
         self.note = ""
 
     def holding(self, state: RobotState) -> np.ndarray:
         """Torque that holds in a state, (n,) N·m, as it is commanded."""
         self._robot.update(state.q, state.v)
-        gravity = self._robot.gravity
-        return np.zeros_like(gravity) if self._facts.gravity == "robot" else gravity.copy()
+        return np.zeros(self._robot.nv) if self._adds else self._robot.gravity.copy()
 
-    def passed(self, state: RobotState) -> bool:
-        """Look at the next state.
+    def passed(self, state: RobotState, tau: np.ndarray | None) -> bool:
+        """Look at the next state, after `holding`.
+
+        Args:
+            state: The state.
+            tau: (n,) what has been commanded since the one before; None where nothing has.
 
         Returns:
             Whether the robot has held for long enough.
@@ -85,41 +92,43 @@ class HoldCheck:
         Raises:
             InputError: It moves, and how.
         """
+        if self._duration <= 0.0:
+            return True
         if self._first is None:
-            self._begin(state)
-            return self._duration <= 0.0
-        assert self._first is not None
-        passed = state.t - self._first.t
-        moved = state.v - self._first.v
+            self._check_stands(state)
+        if self._first is None or tau is None:
+            self._first, self._before = state, state.t
+            return False
+        weight = np.linalg.solve(self._robot.M, self._robot.gravity)
+        self._wrong = -weight if self._adds else weight
+        held = np.linalg.solve(self._robot.M, tau)
+        self._predicted += (state.t - self._before) * (held if self._adds else held - weight)
+        self._before = state.t
+        passed, moved = state.t - self._first.t, state.v - self._first.v - self._predicted
         quick = float(np.max(np.abs(moved))) > MOVING
         if not quick and passed < self._duration:
             return False
         self._judge(moved, passed, quick)
         return True
 
-    def _begin(self, state: RobotState) -> None:
+    def _check_stands(self, state: RobotState) -> None:
         fastest = float(np.max(np.abs(state.v)))
         if fastest > MOVING:
             raise InputError(
                 f"the robot moves at {fastest:.2g} rad/s; a loop begins with one that stands still"
             )
-        self._first = state
-        self._robot.update(state.q, state.v)
-        sign = 1.0 if self._facts.gravity == "controller" else -1.0
-        self._wrong = sign * np.linalg.solve(self._robot.M, self._robot.gravity)
 
     def _judge(self, moved: np.ndarray, passed: float, quick: bool) -> None:
         weight = float(self._wrong @ self._wrong)
-        seen = np.sqrt(weight) * passed > MOVING
-        part = float(moved @ self._wrong) / (passed * weight) if seen and passed > 0.0 else 0.0
-        if seen and part > WRONG:
-            adds, other = ("adds", "robot") if self._facts.gravity == "controller" else (
-                "does not add", "controller"
-            )  # fmt: skip
+        seen = passed > 0.0 and np.sqrt(weight) * passed > MOVING
+        part = float(moved @ self._wrong) / (passed * weight) if seen else 0.0
+        declared = self._facts.gravity
+        if part > WRONG:
+            does, other = ("does not add", "controller") if self._adds else ("adds", "robot")
             raise InputError(
-                f"the driver declares gravity={self._facts.gravity!r}, but the robot moves as one "
-                f"that {adds} the torque against gravity itself ({part:.0%} of the acceleration "
-                f"under its weight): declare gravity={other!r}, for the controller, too"
+                f"the driver declares gravity={declared!r}, but the robot moves as one that {does} the "
+                f"torque against gravity itself ({part:.0%} of the acceleration under its weight): "
+                f"declare gravity={other!r}, for the controller, too"
             )
         if quick:
             worst = int(np.argmax(np.abs(moved)))

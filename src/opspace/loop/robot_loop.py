@@ -300,8 +300,9 @@ class Loop:
         while not self._wanted:
             state = self._next()
             tau = self._hold.holding(state)
+            held = self._hold.passed(state, self._sent if state.tau is None else state.tau)
             # The first commands may be on their way up to what holds.
-            held = not self._limited and self._hold.passed(state)
+            held = held and not self._limited
             self._give(state, tau, Status.OK)
             if held:
                 self._notes += [self._hold.note] if self._hold.note else []
