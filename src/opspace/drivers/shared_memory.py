@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import mmap
 import os
 import time
@@ -11,6 +12,7 @@ import numpy as np
 
 from opspace.errors import InputError, RobotStoppedError
 from opspace.loop.driver import DriverFacts, RobotState
+from opspace.loop.free_cycles import SharedWords
 
 MAGIC = int.from_bytes(b"OSC_SHM1", "little")
 HEAD = 4
@@ -107,13 +109,18 @@ class SharedBlock:
     def close(self) -> None:
         """Look at it no more."""
         del self.words, self._state, self._command
-        self._map.close()
+        # Cycles without Python may hold parts of it, and it goes with them.
+        with contextlib.suppress(BufferError):
+            self._map.close()
 
 
 class SharedMemoryDriver:
     """A robot whose own program shares memory with this one, see `SharedBlock`.
 
     The robot makes the file, and must brake by itself when commands stay away.
+
+    Attributes:
+        seen: First word of the last state that was read.
 
     Args:
         path: The file.
@@ -130,7 +137,15 @@ class SharedMemoryDriver:
         self._path, self._nq, self._n = Path(path), nq, n
         self._spin = spin
         self._block: SharedBlock | None = None
-        self._seen = 0
+        self.seen = 0
+
+    def shared(self) -> SharedWords:
+        """Return the memory for cycles without Python, after `start`."""
+        assert self._block is not None
+        words = self._block.words.view(np.int64)
+        state = HEAD + 3 + self._nq + 2 * self._n
+        nap = 0 if self._spin else round(1e9 * NAP)
+        return SharedWords(words[3:4], words[HEAD:state], words[state:], FAULT, nap)
 
     def start(self) -> None:
         """Open the memory, and let the robot take commands.
@@ -145,7 +160,7 @@ class SharedMemoryDriver:
             raise InputError(
                 f"{self._path}: somebody drives this robot, or did and the robot has not noticed his end"
             )
-        self._block, self._seen = block, block.told
+        self._block, self.seen = block, block.told
         block.wanted = DRIVE
 
     def read(self, timeout: float) -> RobotState | None:
@@ -157,7 +172,7 @@ class SharedMemoryDriver:
         block = self._block
         assert block is not None
         end = time.perf_counter() + timeout
-        while (told := block.told) == self._seen or told % 2:
+        while (told := block.told) == self.seen or told % 2:
             if time.perf_counter() > end:
                 return None
             if not self._spin:
@@ -167,7 +182,7 @@ class SharedMemoryDriver:
         found = block.state()
         if found is None:
             return None
-        self._seen = told
+        self.seen = told
         q, v, tau = np.split(found[1:], [self._nq, self._nq + self._n])
         return RobotState(float(found[0]), q, v, None if np.isnan(tau[0]) else tau)
 

@@ -32,6 +32,10 @@ class Cycles(NamedTuple):
 class History:
     """A ring of cycles.
 
+    Attributes:
+        rows: t, q, v, tau, status and time to the answer of each, in any order.
+        seen: How many there have been.
+
     Args:
         rows: How many are remembered.
         nq: Coordinates of a configuration.
@@ -44,7 +48,7 @@ class History:
     def __init__(self, rows: int, nq: int, n: int) -> None:
         if rows < 1:
             raise InputError(f"a history has at least one cycle, not {rows}")
-        self._rows = np.full((rows, 3 + nq + 2 * n), np.nan)
+        self.rows = np.full((rows, 3 + nq + 2 * n), np.nan)
         self._ends = np.cumsum([1, nq, n, n, 1])
         self.seen = 0
 
@@ -58,7 +62,7 @@ class History:
         answered: float,
     ) -> None:
         """Remember a cycle in the place of the oldest one."""
-        row, ends = self._rows[self.seen % len(self._rows)], self._ends
+        row, ends = self.rows[self.seen % len(self.rows)], self._ends
         row[0] = t
         row[1 : ends[1]] = q
         row[ends[1] : ends[2]] = v
@@ -69,7 +73,7 @@ class History:
 
     def cycles(self) -> Cycles:
         """Copy what is remembered; from any thread, where the row being written may be a mixture."""
-        seen, size = self.seen, len(self._rows)
-        rows = self._rows[:seen] if seen <= size else np.roll(self._rows, -(seen % size), axis=0)
+        seen, size = self.seen, len(self.rows)
+        rows = self.rows[:seen] if seen <= size else np.roll(self.rows, -(seen % size), axis=0)
         t, q, v, tau, status, answered = np.split(rows.copy(), self._ends, axis=1)
         return Cycles(t[:, 0], q, v, tau, status[:, 0].astype(np.int64), answered[:, 0])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import astuple, dataclass, field
 
 import numpy as np
 
@@ -33,6 +33,10 @@ class Counts:
     jumps: int = 0
     limited: int = 0
     overruns: int = 0
+
+    def __add__(self, other: Counts) -> Counts:
+        ours, theirs = astuple(self), astuple(other)
+        return Counts(*(a + b for a, b in zip(ours, theirs, strict=True)))
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,6 @@ import logging
 import threading
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -15,8 +14,11 @@ from opspace.controller import ReferenceController
 from opspace.controller.handover import Handover
 from opspace.controller.watchdog import JUMP, MISSED
 from opspace.errors import InputError, OpspaceError
+from opspace.kernels.cycle_columns import FROZEN, JUMPED, OVER, SILENT
+from opspace.kernels.cycle_columns import STOPPED as STOPPED_BY_STATUS
 from opspace.loop.declared import HoldCheck, check_declared
 from opspace.loop.driver import Driver, RobotState
+from opspace.loop.free_cycles import FreeCycles
 from opspace.loop.history import Cycles, History
 from opspace.loop.loop import Observer, Stepping, StopRule, answered
 from opspace.loop.loop_report import Counts, LoopReport, answer_times
@@ -42,6 +44,8 @@ STANDING = 0.01
 """Speed below which a joint stands, rad/s or m/s."""
 STANDS = 20
 """For so many states in a row."""
+TENDING = 5e-3
+"""How often what users change is looked for while cycles are compiled, s."""
 
 STOPPED = "stopped"
 """Why a loop ends that is asked to."""
@@ -81,6 +85,9 @@ class Loop:
         patience: How many periods without a new state are waited for.
         history: How many cycles are remembered.
         real_time: What to ask of the operating system; None for nothing.
+        compiled: Have compiled code go through the cycles, with a robot behind shared memory: no other
+            thread of Python, whatever it does, is waited for. Targets and gains change as before. While
+            tasks come or go, and to begin and to brake, cycles are Python's.
 
     Raises:
         InputError: What the driver declares does not go with the controller, or an option cannot be.
@@ -101,6 +108,7 @@ class Loop:
         patience: int = 5,
         history: int = 10_000,
         real_time: RealTime | None = None,
+        compiled: bool = False,
     ) -> None:
         facts = self._facts = driver.facts
         check_declared(facts, controller)
@@ -127,6 +135,16 @@ class Loop:
         self._real_time = real_time
         self._history = History(history, robot.nq, robot.nv)
         self._desk = RequestDesk(Changes(controller, tasks), answer=_answered)
+        self._free: FreeCycles | None = None
+        if compiled:
+            if observers or black_box is not None or stop != NO_RULE:
+                raise InputError(
+                    "compiled cycles tell no observers, black box or stop rule: the history has them all"
+                )
+            step = np.full(robot.nv, np.inf) if self._rate.step is None else self._rate.step
+            self._free = FreeCycles(
+                controller, driver, self._history, facts, self._patience, int(stop_on), step
+            )
         self._counts, self._seen = Counts(), Status.OK
         self._notes: list[str] = []
         self._last: RobotState | None = None
@@ -158,6 +176,8 @@ class Loop:
             warm_up()
         self._thread = threading.Thread(target=self._live, name="opspace loop")
         self._thread.start()
+        if self._free is not None:
+            threading.Thread(target=self._tend, args=(self._free,), daemon=True).start()
         try:
             self._moves.wait()
         except BaseException:
@@ -171,6 +191,8 @@ class Loop:
     def stop(self, reason: str = STOPPED) -> None:
         """Have the robot brake and the loop end; `wait` waits for that."""
         self._wanted = self._wanted or reason or STOPPED
+        if self._free is not None:
+            self._free.ask()
 
     def wait(self, seconds: float | None = None) -> bool:
         """Wait while the robot moves.
@@ -218,6 +240,8 @@ class Loop:
     def ask(self, request: RunRequest) -> None:
         """Ask for a change of the tasks; it is done between two cycles, and logged where refused."""
         self._desk.ask(request)
+        if self._free is not None:
+            self._free.ask()
 
     @property
     def running(self) -> bool:
@@ -236,7 +260,7 @@ class Loop:
             completed=self._completed,
             reason=self._reason,
             t=np.nan if self._last is None else self._last.t,
-            counts=replace(self._counts),
+            counts=self._counts + (Counts() if self._free is None else self._free.counts),
             seen=self._seen,
             standstill=self._standstill,
             answered=answer_times(self._history.cycles()),
@@ -322,10 +346,56 @@ class Loop:
             self._fail(error)
         self._brake()
 
+    def _tend(self, free: FreeCycles) -> None:
+        """Do for compiled cycles what is no matter of microseconds, in a thread of its own."""
+        main = threading.main_thread()
+        while self.running:
+            if self._moves.is_set():
+                try:
+                    free.tend()
+                except Exception as error:
+                    log.exception("compiled cycles cannot go on")
+                    self.stop(f"{type(error).__name__}: {error}")
+                    return
+                if not main.is_alive():
+                    self.stop("the program has ended")
+            time.sleep(TENDING)
+
+    def _run_freely(self, free: FreeCycles, ends: float) -> bool:
+        """Go through cycles without Python; tell whether the loop has ended."""
+        assert self._last is not None
+        assert self._sent is not None
+        code = free.run(self._last, self._woke, self._sent, ends)
+        self._last, self._woke, self._sent, statuses = free.gather(self._counts)
+        self._seen |= Status(statuses)
+        if code == OVER:
+            self._completed = True
+        elif code == STOPPED_BY_STATUS:
+            self._end(f"status {Status(statuses) & self._stop_on!r}")
+        elif code == JUMPED:
+            self._seen |= Status.TIME_JUMP
+            if Status.TIME_JUMP in self._stop_on:
+                self._end(f"status {Status.TIME_JUMP!r}")
+            else:
+                self._controller.restart()
+                return False
+        elif code == SILENT:
+            raise _NoStateError(f"no new state came from the robot for {self._patience:.3g} s")
+        elif code == FROZEN:
+            raise _NoStateError("the robot told the same state while it moved")
+        else:
+            return False
+        return True
+
     def _control(self) -> None:
         begun: float | None = None
         main = threading.main_thread()
         while True:
+            free = self._free
+            if begun is not None and free is not None and not self._wanted and self._desk.idle:
+                ends = np.inf if self._duration is None else begun + self._duration
+                if free.ready() and self._run_freely(free, ends):
+                    return None
             state = self._next()
             begun = state.t if begun is None else begun
             command = answered(self._stepping, state.t, state.q, state.v, state.wrenches)

@@ -16,6 +16,9 @@ class TorqueRate:
     A robot that has lost a command compares with the one before it, so what was sent last is the
     wrong thing to compare with wherever the robot says what it took.
 
+    Attributes:
+        step: (n,) the most by which a command differs, N·m; None for any.
+
     Args:
         rate: N·m/s, a number or one per joint; None for any.
         period: Time between two commands, s.
@@ -26,11 +29,11 @@ class TorqueRate:
     """
 
     def __init__(self, rate: float | tuple[float, ...] | None, period: float, n: int) -> None:
-        self._step: np.ndarray | None = None
+        self.step: np.ndarray | None = None
         if rate is not None:
             if np.ndim(rate) and np.shape(rate) != (n,):
                 raise InputError(f"torque_rate takes one rate per joint, {n}, not {np.shape(rate)}")
-            self._step = np.full(n, MARGIN * period * np.asarray(rate, float))
+            self.step = np.full(n, MARGIN * period * np.asarray(rate, float))
 
     def within(self, tau: np.ndarray, accepted: np.ndarray | None) -> np.ndarray:
         """Return the nearest command that the robot takes.
@@ -42,9 +45,9 @@ class TorqueRate:
         Returns:
             ``tau`` itself where it is near enough.
         """
-        if self._step is None or accepted is None:
+        if self.step is None or accepted is None:
             return tau
-        low, high = accepted - self._step, accepted + self._step
+        low, high = accepted - self.step, accepted + self.step
         if np.all(tau >= low) and np.all(tau <= high):
             return tau
         return np.clip(tau, low, high)

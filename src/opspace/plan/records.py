@@ -14,6 +14,7 @@ from opspace.kernels.columns import (
     VARIABLE_SIZE,
 )
 from opspace.machine.field_table import Field, RecordTable
+from opspace.plan.cycle_records import CYCLES
 from opspace.plan.distance_records import DISTANCES
 from opspace.robots.bodies import DYNAMICS, RIGID_BODIES
 
@@ -35,6 +36,8 @@ SIZES = {
     "corners": "corners that the blend can have",
     "widest": "the larger of rows + limits and n, at least one",
     "states": "states of a batch",
+    "told": "numbers that a robot tells: time, configuration, velocity, accepted torque",
+    "ring": "cycles that a loop remembers",
     "given": "states that own activations are given for: one that stands for all, or all",
     "here": "rows of one level",
     "free": "motions that the levels above it leave free",
@@ -282,4 +285,5 @@ TABLES = (
     STATES,
     REMEMBERED,
     SPECTRUM,
+    CYCLES,
 )
