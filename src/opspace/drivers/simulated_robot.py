@@ -242,12 +242,8 @@ class SimulatedRobot:
         return tau - robot.gravity if self._adds else tau
 
 
-def main(arguments: Sequence[str] | None = None) -> None:
-    """Run a robot until it is told to end, then print what has happened as JSON.
-
-    Args:
-        arguments: The words of the command line; None takes those of the process.
-    """
+def parser() -> argparse.ArgumentParser:
+    """What the command line may say."""
     parser = argparse.ArgumentParser(
         prog="python -m opspace.drivers.simulated_robot",
         description="A simulated robot behind UDP or shared memory.",
@@ -265,7 +261,17 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--reorder", type=float, default=0.0, help="part that arrives late")
     parser.add_argument("--seed", type=int, default=0, help="of chance")
     parser.add_argument("--lockstep", action="store_true", help="wait for every answer")
-    given = parser.parse_args(arguments)
+    return parser
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run a robot until it is told to end, then print what has happened as JSON.
+
+    Args:
+        arguments: The words of the command line; None takes those of the process.
+    """
+    words = parser()
+    given = words.parse_args(arguments)
     try:
         robot = load_robot(given.robot)
         adds = given.gravity == "robot"
@@ -278,7 +284,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
             side = SharedRobotSide(given.memory, robot.nq, robot.nv)
             print(f"sharing {given.memory}", flush=True)
     except (OpspaceError, OSError) as error:
-        parser.error(str(error))
+        words.error(str(error))
     one = SimulatedRobot(
         plant,
         robot,
