@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from opspace.errors import ModelWarning as ModelWarning
     from opspace.errors import OpspaceError as OpspaceError
     from opspace.errors import RecordingError as RecordingError
+    from opspace.errors import RobotStoppedError as RobotStoppedError
     from opspace.errors import ScenarioError as ScenarioError
     from opspace.errors import UnknownNameError as UnknownNameError
     from opspace.export.c_library import export_c as export_c
@@ -37,8 +38,14 @@ if TYPE_CHECKING:
     from opspace.law import intermediate_values as intermediate_values
     from opspace.law import task_torque as task_torque
     from opspace.loop import AnyPlant as AnyPlant
+    from opspace.loop import Driver as Driver
+    from opspace.loop import DriverFacts as DriverFacts
+    from opspace.loop import Loop as Loop
+    from opspace.loop import LoopReport as LoopReport
     from opspace.loop import Observer as Observer
     from opspace.loop import Outcome as Outcome
+    from opspace.loop import RealTime as RealTime
+    from opspace.loop import RobotState as RobotState
     from opspace.loop import Stepping as Stepping
     from opspace.loop import StopRule as StopRule
     from opspace.loop import simulate as simulate
@@ -112,8 +119,8 @@ _NAMES = {
     "opspace.contacts": "GroundContact PointContact SoleContact",
     "opspace.controller": "Controller",
     "opspace.errors": (
-        "InputError MissingExtraError ModelError ModelWarning OpspaceError RecordingError ScenarioError "
-        "UnknownNameError"
+        "InputError MissingExtraError ModelError ModelWarning OpspaceError RecordingError "
+        "RobotStoppedError ScenarioError UnknownNameError"
     ),
     "opspace.export.c_library": "export_c",
     "opspace.law": (
@@ -125,7 +132,10 @@ _NAMES = {
     "opspace.record.replay": "Replay replay",
     "opspace.robots": "Payload Robot RobotInfo WristSensor available_robots load_robot",
     "opspace.robots.shapes": "LinkCapsule",
-    "opspace.loop": "AnyPlant Observer Outcome Stepping StopRule simulate",
+    "opspace.loop": (
+        "AnyPlant Driver DriverFacts Loop LoopReport Observer Outcome RealTime RobotState Stepping "
+        "StopRule simulate"
+    ),
     "opspace.plan.calibration": "Calibration",
     "opspace.plan.scales": "Singularity",
     "opspace.sim": "Ground Plant Surface Wall",

@@ -495,6 +495,36 @@ def shapes(
         print(f"results: {write_shapes(out, found.name, margin, guard.shapes, guard.chosen)}")
 
 
+@app.command(epilog="Example: opspace doctor --seconds 60 --core 1")
+def doctor(
+    seconds: Annotated[float, typer.Option(help="How long each kind of thread is measured.")] = 5.0,
+    period: Annotated[float, typer.Option(help="Time between two wake-ups, s.")] = 1e-3,
+    core: Annotated[int | None, typer.Option(help="Core that the second thread stays on.")] = None,
+    priority: Annotated[int, typer.Option(help="Its priority, 1 to 99.")] = 80,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of a table.")] = False,
+) -> None:
+    """Measure how late this machine wakes a control loop up, and say what to set."""
+    from opspace.loop import RealTime
+    from opspace.loop.wake_up import PARTS, advice, wake_ups
+
+    measured = {
+        "ordinary": wake_ups(seconds, period, None),
+        "real-time": wake_ups(seconds, period, RealTime(priority=priority, core=core)),
+    }
+    late = {kind: [one.percentile(p) for p in PARTS.values()] for kind, one in measured.items()}
+    advised = [*measured["real-time"].refused, *advice()]
+    if as_json:
+        found = {kind: dict(zip(PARTS, values, strict=True)) for kind, values in late.items()}
+        print(json.dumps({"late_us": found, "advice": advised}, indent=1, ensure_ascii=False))
+        return
+    print(f"late by, µs, waking up every {1e3 * period:g} ms for {seconds:g} s\n")
+    rows = [(kind, *(f"{value:.0f}" for value in values)) for kind, values in late.items()]
+    _print_table(("thread", *PARTS), rows)
+    for sentence in advised:
+        print(f"\n{sentence}", end="")
+    print()
+
+
 def _position(text: str) -> tuple[str, float | None]:
     """Read NAME or NAME=POSITION."""
     name, given, position = text.partition("=")

@@ -50,6 +50,10 @@ class RecordingError(OpspaceError):
     """A recording that cannot be written or read."""
 
 
+class RobotStoppedError(OpspaceError):
+    """A robot that has braked by itself and takes no commands any more."""
+
+
 class MissingExtraError(OpspaceError, ImportError):
     """An optional dependency that is not installed."""
 

@@ -1,5 +1,6 @@
 """Documents for users hold: programs run, commands exist, links lead somewhere."""
 
+import importlib
 import json
 import re
 import shlex
@@ -135,6 +136,8 @@ def check_command(line):
         assert set((asked[1] or "all").split(",")) <= set(extras), line
     elif words[0] == "cc":  # run by export/test_c_library
         assert words[-1] == "hold", line
+    elif words[:2] == ["python", "-m"]:
+        importlib.import_module(words[2]).parser().parse_args(words[3:])
     elif words[0] == "python":
         assert (ROOT / words[1]).is_file(), line
     else:

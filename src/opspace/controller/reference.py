@@ -340,6 +340,16 @@ class ReferenceController:
         return self._collisions
 
     @property
+    def period(self) -> float | None:
+        """Time between two ticks that was announced, s; None if none was."""
+        return self._rules.period or None
+
+    @property
+    def on_time_jump(self) -> str:
+        """What happens when time runs backwards or jumps; see `opspace.controller.watchdog.POLICIES`."""
+        return "report" if self._timing is None else self._timing.policy
+
+    @property
     def blending(self) -> str:
         """Name of the blending."""
         return self._blending.name
@@ -419,6 +429,24 @@ class ReferenceController:
         if self._forces is not None:
             self._forces.after(command.status)
         return command if self._plain else self._finished(command, members)
+
+    def braking(self, q: ArrayLike, v: ArrayLike) -> np.ndarray:
+        """Compute the torque that brakes every joint in a state, as a tick with a fault does.
+
+        Nothing else changes: what the tasks remember is from the last tick.
+
+        Args:
+            q: Configuration, (nq,).
+            v: Velocity, (n,), rad/s.
+
+        Returns:
+            (n,) bias with joint damping, N·m, inside the motors' limits and without what the robot adds.
+
+        Raises:
+            InputError: The state has a wrong size or is not finite.
+        """
+        self.robot.update(numbers(q, "q"), numbers(v, "v"))
+        return self._braking() - self._added_by_robot()
 
     @property
     def _holds(self) -> bool:

@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 
 from opspace.command import Command
+from opspace.controller.wrenches import Wrenches
 from opspace.errors import InputError
 from opspace.loop.any_plant import AnyPlant
 from opspace.robots.joint_units import effort_unit, joint_units
@@ -99,13 +100,19 @@ def check_gravity(plant: object, controller: object) -> None:
     )
 
 
-def _measured(plant: AnyPlant, controller: Stepping) -> dict[str, Any]:
-    """Read the wrenches of a plant that measures some, for a controller that takes them."""
+def _measured(plant: AnyPlant) -> Wrenches | None:
+    """Read the wrenches of a plant that measures some."""
     read = getattr(plant, "wrenches", None)
-    if read is None or not hasattr(controller, "wrenches"):
-        return {}
-    found = read()
-    return {"wrenches": found} if found else {}
+    return None if read is None else read()
+
+
+def answered(
+    controller: Stepping, t: float, q: np.ndarray, v: np.ndarray, wrenches: Wrenches | None
+) -> Command:
+    """Step a controller, with what the robot feels where both have to do with wrenches."""
+    if not wrenches or not hasattr(controller, "wrenches"):
+        return controller.step(t, q, v)
+    return controller.step(t, q, v, wrenches=wrenches)  # pyright: ignore[reportCallIssue]
 
 
 def simulate(
@@ -142,7 +149,7 @@ def simulate(
         if not (np.all(np.isfinite(plant.q)) and np.all(np.isfinite(plant.v))):
             return Outcome(False, t, "the simulation diverged")
         q, v = plant.measure()
-        command = controller.step(t, q, v, **_measured(plant, controller))
+        command = answered(controller, t, q, v, _measured(plant))
         for observer in observers:
             observer.observe(q, v, command)
         reason = stop.reason(controller.robot, plant.v, command.tau)

@@ -236,6 +236,11 @@ class Changes:
                 assert request.kp is not None
                 self._change_gain(task, request.kp, t, duration)
 
+    @property
+    def moving(self) -> bool:
+        """Whether a gain is on its way."""
+        return bool(self._ramps)
+
     def follow(self, t: float) -> None:
         """Move on what takes time: the gains on their way at time ``t`` [s]."""
         for name, ramp in list(self._ramps.items()):
@@ -288,6 +293,11 @@ class RequestDesk:
     def ask(self, request: RunRequest) -> None:
         """Put a request on the desk, from any thread; each is dealt with after a tick of its own."""
         self._waiting.append(request)
+
+    @property
+    def idle(self) -> bool:
+        """Whether nothing waits, and no gain is on its way."""
+        return not self._waiting and not self._changes.moving
 
     def observe(self, q: np.ndarray, v: np.ndarray, command: Command) -> None:
         """Deal with the request that has waited longest.

@@ -25,6 +25,7 @@ from opspace.machine.processor import Processor
 LIBRARY = {
     *("acos", "asin", "atan", "atan2", "cos", "cosh", "exp", "fmod", "log", "pow", "sin"),
     *("sincos", "sqrt", "tan", "tanh", "memcpy", "memmove", "memset"),
+    *("clock_gettime", "nanosleep"),
 }
 """What the object may ask of the process that loads it: C's own library, nothing of Python's."""
 

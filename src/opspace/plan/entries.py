@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from opspace.machine.kernel_entry import KernelEntry
 from opspace.machine.library import Library
-from opspace.plan.records import SPECTRUM, STATES, TICK
+from opspace.plan.records import CYCLES, SPECTRUM, STATES, TICK
 
 ENTRIES = (
     KernelEntry("opspace.kernels.tick", "tick", (float, TICK), gives=int),
     KernelEntry(
         "opspace.kernels.many_states", "ticks", (float, TICK, STATES, int, int), releases=True
     ),
+    KernelEntry("opspace.kernels.cycles", "cycles", (TICK, CYCLES), gives=int, releases=True),
     KernelEntry("opspace.kernels.spectrum", "spectrum", (SPECTRUM,)),
     KernelEntry("opspace.kernels.gravity", "gravity", (TICK,)),
 )

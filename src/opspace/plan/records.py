@@ -17,6 +17,7 @@ from opspace.law.press_columns import MEMORY_SIZE, PRESS_SIZE
 from opspace.machine.field_table import Field, RecordTable
 from opspace.plan.bound_records import BOUNDS
 from opspace.plan.contact_records import STANCE
+from opspace.plan.cycle_records import CYCLES
 from opspace.plan.distance_records import DISTANCES
 from opspace.robots.bodies import DYNAMICS, RIGID_BODIES
 
@@ -40,6 +41,8 @@ SIZES = {
     "corners": "corners that the blend can have",
     "widest": "the largest of rows + limits, n and 6 contacts, at least one",
     "states": "states of a batch",
+    "told": "numbers that a robot tells: time, configuration, velocity, accepted torque",
+    "ring": "cycles that a loop remembers",
     "given": "states that own activations are given for: one that stands for all, or all",
     "here": "rows of one level",
     "free": "motions that the levels above it leave free",
@@ -260,4 +263,5 @@ TABLES = (
     STATES,
     REMEMBERED,
     SPECTRUM,
+    CYCLES,
 )
