@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike
 from opspace.contacts.ground_contact import GroundContact
 from opspace.errors import InputError
 from opspace.law.cones import point_cone, point_metric
+from opspace.law.contact_forces import NORMAL
 from opspace.tasks.validation import Array, finite_array
 
 
@@ -51,6 +52,11 @@ class PointContact(GroundContact):
         x = np.cross(np.eye(3)[np.argmin(np.abs(z))], z)
         x /= np.linalg.norm(x)
         self._surface = np.stack([x, np.cross(z, x), z], axis=1)
+
+    @property
+    def normal(self) -> Array:
+        """Direction out of the surface, (3,) in the world, of length 1."""
+        return self._surface[:, NORMAL].copy()
 
     def cone(self) -> Array:
         """Return the rows of the friction pyramid, (4, 3)."""

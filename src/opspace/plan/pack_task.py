@@ -53,6 +53,7 @@ from opspace.robots.motion_axes import FramePlace, MotionAxes
 from opspace.stack import Member
 from opspace.tasks import TASK_KINDS, Task
 from opspace.tasks.activations import own_activation
+from opspace.tasks.angular_momentum import AngularMomentumTask
 from opspace.tasks.force import ForceTask
 from opspace.tasks.gains import Gains
 from opspace.tasks.impedance import ImpedanceTask
@@ -84,7 +85,7 @@ does."""
 PACKED_ONCE = ("source", "quantity", "selection", "in_tool_axes", "layout", "rows")
 """Attributes that a subclass may not compute anew, as a property would."""
 
-EVALUATED_IN_PYTHON = (ForceTask, ImpedanceTask)
+EVALUATED_IN_PYTHON = (AngularMomentumTask, ForceTask, ImpedanceTask)
 """Tasks of the library that no kernel evaluates."""
 
 MOST_JOINTS = 4 * SIGNS

@@ -7,7 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from opspace.contacts import GroundContact
 from opspace.controller import ReferenceController
+from opspace.record.contact_columns import GROUP, subject_of_contact
 from opspace.robots.adapter import added_frames, held_joints
 from opspace.robots.catalogue import CATALOGUE, locate
 from opspace.robots.joint_units import joint_units
@@ -19,18 +21,24 @@ from opspace.tasks.motions import CenterOfMass, WorldFrame
 from opspace.tasks.quantities import Orientation, Position
 
 
-def subject_of(controller: ReferenceController, tasks: Sequence[Task] = ()) -> dict[str, Any]:
-    """Describe robot and tasks in JSON's own types.
+def subject_of(
+    controller: ReferenceController,
+    tasks: Sequence[Task] = (),
+    contacts: Sequence[GroundContact] = (),
+) -> dict[str, Any]:
+    """Describe robot, tasks and contacts in JSON's own types.
 
     Args:
         controller: The controller that is recorded.
         tasks: Tasks that are not in its stack yet.
+        contacts: Contacts that are there or may come.
 
     Returns:
         ``robot`` (name or file, joints, their units and limits in rad or m, torque limits, the buffer
         before a limit in rad or m, and by limit the acceleration that its joint brakes with; null
-        where there is none) and ``tasks`` (units, stiffness, level, and what its target can be led
-        to).
+        where there is none), ``tasks`` (units, stiffness, level, and what its target can be led
+        to), and ``contacts`` (frame, offset in m, friction, half the sides of a sole in m, normal of a
+        point), which only robots with a floating base have.
     """
     stack = controller.stack
     found = {
@@ -39,7 +47,10 @@ def subject_of(controller: ReferenceController, tasks: Sequence[Task] = ()) -> d
         for task in level
     }
     found.update({task.name: _task(task, None) for task in tasks})
-    return {"robot": _robot(controller), "tasks": found}
+    about = {"robot": _robot(controller), "tasks": found}
+    if contacts:
+        about[GROUP] = {one.name: subject_of_contact(one) for one in contacts}
+    return about
 
 
 def _robot(controller: ReferenceController) -> dict[str, Any]:

@@ -13,8 +13,8 @@ from opspace.scenario.document import Key
 from opspace.scenario.references import Values, as_reference, build_target, rotations, vectors
 from opspace.scenario.schema import Scenario
 from opspace.scenario.targets import PoseParts
-from opspace.scenario.task_entries import TaskEntry
-from opspace.tasks import TASK_KINDS, PoseReference, PostureTask
+from opspace.scenario.task_entries import PlacedEntry, TaskEntry
+from opspace.tasks import TASK_KINDS, PoseReference, PostureTask, Task
 from opspace.tasks.joint_layout import joint_layout
 from opspace.tasks.motion_task import MotionTask
 from opspace.tasks.tracking import TrackingTask
@@ -23,7 +23,7 @@ from opspace.tasks.validation import Array
 _NOT_OPTIONS = ("type", "level", "present", "target")
 
 
-def build_tasks(scenario: Scenario, robot: Robot) -> dict[str, TrackingTask]:
+def build_tasks(scenario: Scenario, robot: Robot) -> dict[str, Task]:
     """Build every task of a scenario.
 
     Args:
@@ -36,7 +36,7 @@ def build_tasks(scenario: Scenario, robot: Robot) -> dict[str, TrackingTask]:
     Raises:
         ScenarioError: A name that the robot does not have, or a value that does not fit it.
     """
-    built: dict[str, TrackingTask] = {}
+    built: dict[str, Task] = {}
     for name, entry in scenario.tasks.items():
         for key, problem in _unknown_names(entry, robot):
             raise scenario.error(("tasks", name, *key), problem) from None
@@ -49,7 +49,8 @@ def build_tasks(scenario: Scenario, robot: Robot) -> dict[str, TrackingTask]:
         except OpspaceError as error:
             raise scenario.error(("tasks", name), str(error)) from error
         try:
-            task.target = _target(task, entry, robot)
+            if isinstance(task, TrackingTask) and isinstance(entry, TaskEntry):
+                task.target = _target(task, entry, robot)
         except OpspaceError as error:
             raise scenario.error(("tasks", name, "target"), str(error)) from error
         built[name] = task
@@ -77,7 +78,7 @@ def configuration(value: str | tuple[float, ...], robot: Robot) -> Array:
     return np.array(known[value])
 
 
-def _unknown_names(entry: TaskEntry, robot: Robot) -> Iterator[tuple[Key, str]]:
+def _unknown_names(entry: PlacedEntry, robot: Robot) -> Iterator[tuple[Key, str]]:
     """Find names of frames and joints that the robot does not have."""
     for key in ("frame", "reference_frame"):
         frame = getattr(entry, key, None)

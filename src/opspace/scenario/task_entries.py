@@ -52,20 +52,26 @@ PoseSpeeds = Annotated[tuple[float, ...], Number("linear m/s, angular rad/s", ab
 _TARGET = "value or reference to follow; null holds the value at the start"
 
 
-class TaskEntry(Entry):
-    """What every task has."""
+class PlacedEntry(Entry):
+    """What every task has, whatever it asks for."""
 
     level: Annotated[int, Checked(whole)] = Field(description="priority, 0 is the highest")
     present: bool = Field(
         default=True,
         description="whether it is in the stack at the start; one that an event inserts first is not",
     )
+    if TYPE_CHECKING:  # every kind has its own
+        type: str
+
+
+class TaskEntry(PlacedEntry):
+    """What every task has that is led to a target."""
+
     kp: Stiffness = Field(default=100.0, description="stiffness [1/s²], a number or one per row")
     kv: Damping | None = Field(
         default=None, description="damping [1/s]; null is critical, 2 sqrt(kp)"
     )
     if TYPE_CHECKING:  # every kind has its own
-        type: str
         target: Any
 
     def rows(self) -> int | None:
@@ -145,12 +151,15 @@ _CONTROLLED: Mapping[str, Mapping[str, _Argument]] = {
         ("joint", JointTarget, JointSpeed, JointAcceleration, f"{_SPEED} [rad/s or m/s]"),
         ("joints", PostureTarget, JointSpeed, JointAcceleration, f"norm of the {_SPEED} [rad/s]"),
     )
+} | {
+    "momentum": {
+        "kv": _Argument(Annotated[float, Number("1/s", at_least=0.0)], "rate of decay [1/s]")
+    }
 }
-_ALWAYS = ("self", "name", *TaskEntry.model_fields)
 _PLAIN: Mapping[Any, Any] = {float: Annotated[float, Number("1")], bool: bool, str: str}
 
 
-def make_entry(name: str, kind: TaskKind) -> type[TaskEntry]:
+def make_entry(name: str, kind: TaskKind) -> type[PlacedEntry]:
     """Make the entry of a kind of task.
 
     Args:
@@ -162,9 +171,11 @@ def make_entry(name: str, kind: TaskKind) -> type[TaskEntry]:
         ``present``.
     """
     known = {**_ARGUMENTS, **_CONTROLLED[kind.controls]}
+    base = PlacedEntry if kind.controls == "momentum" else TaskEntry
+    always = ("self", "name", *base.model_fields)
     fields: dict[str, Any] = {"type": (Literal[name], Field(description=name))}
     for key, argument in inspect.signature(kind.task).parameters.items():
-        if key in _ALWAYS:
+        if key in always:
             continue
         takes, means = known.get(key) or _by_type(kind, key)
         default = argument.default
@@ -172,7 +183,7 @@ def make_entry(name: str, kind: TaskKind) -> type[TaskEntry]:
             default = None if key == "frame" else ...
         fields[key] = (takes, Field(default=default, description=means))
     camel = name.title().replace("_", "")
-    return create_model(f"{camel}Entry", __base__=TaskEntry, __module__=__name__, **fields)
+    return create_model(f"{camel}Entry", __base__=base, __module__=__name__, **fields)
 
 
 def _by_type(kind: TaskKind, key: str) -> _Argument:
@@ -187,13 +198,13 @@ def _by_type(kind: TaskKind, key: str) -> _Argument:
     return _Argument(_nullable(takes) if type(None) in choices else takes, means)
 
 
-ENTRIES: Mapping[str, type[TaskEntry]] = MappingProxyType(
+ENTRIES: Mapping[str, type[PlacedEntry]] = MappingProxyType(
     {name: make_entry(name, kind) for name, kind in TASK_KINDS.items()}
 )
 """The entry of every kind of task, by what a scenario calls it."""
 
 if TYPE_CHECKING:
-    AnyTask = TaskEntry
+    AnyTask = PlacedEntry
 else:
     AnyTask = Annotated[
         Union[tuple(Annotated[entry, Tag(f"<{name}>")] for name, entry in ENTRIES.items())],  # noqa: UP007

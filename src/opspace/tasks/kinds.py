@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Literal, NamedTuple
 
-from opspace.tasks.tracking import TrackingTask
+from opspace.tasks.task import Task
 
 
 class TaskKind(NamedTuple):
@@ -13,8 +13,8 @@ class TaskKind(NamedTuple):
     Attributes:
         task: Its class.
         controls: What a target is a value of; it says which targets a scenario can give, in which
-            unit speeds are, and how many rows there are.
+            unit speeds are, and how many rows there are; "momentum" has no target.
     """
 
-    task: type[TrackingTask]
-    controls: Literal["position", "orientation", "pose", "joint", "joints"]
+    task: type[Task]
+    controls: Literal["position", "orientation", "pose", "joint", "joints", "momentum"]
