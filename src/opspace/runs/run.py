@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from opspace.controller import Controller, ReferenceController
 from opspace.loop import Observer, Outcome, simulate
 from opspace.loop.requests import FILE, Changes, RequestPlayer
 from opspace.record import Recording, load
@@ -50,6 +52,7 @@ def run_scenario(
     progress: ProgressBar | None = None,
     overwrite: bool = False,
     requests: Path | None = None,
+    controller: Callable[..., ReferenceController] = Controller,
 ) -> RunResult:
     """Simulate a scenario, record every tick and measure the run.
 
@@ -60,6 +63,7 @@ def run_scenario(
         progress: Bar that gets a line for this run.
         overwrite: Replace a recording that is already there.
         requests: File of requests of a run that was watched, to be asked for again.
+        controller: Makes the controller.
 
     Returns:
         What the run left behind.
@@ -69,7 +73,7 @@ def run_scenario(
         RecordingError: There is a recording already, the directory cannot be written, or the
             requests cannot be read.
     """
-    built = build(scenario)
+    built = build(scenario, controller)
     watching: list[Observer] = []
     asked = None
     if requests is not None:

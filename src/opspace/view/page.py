@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from opspace.errors import InputError, ModelWarning, missing_extra
+from opspace.record.contact_columns import GROUP
 from opspace.record.growing import GrowingRecording
 from opspace.robots import Robot, load_robot
 from opspace.robots.joint_units import effort_unit
@@ -23,7 +24,8 @@ except ImportError:
 
 from opspace.view import panels
 from opspace.view.charts import Chart, sigma_columns, torque_columns
-from opspace.view.controls import Ask, RunControls, StackControls
+from opspace.view.contact_scene import ContactScene
+from opspace.view.controls import Ask, ContactControls, RunControls, StackControls
 from opspace.view.frame import FrameReader
 from opspace.view.scene import RobotScene
 
@@ -66,12 +68,15 @@ class Page:
             self._server = viser.ViserServer(host, port, label="opspace", verbose=False)
         self._controls: StackControls | None = None
         self._build(directory, ask)
+        robot = _robot(self._about["robot"])
         self._scene = RobotScene(
             self._server,
-            _robot(self._about["robot"]),
+            robot,
             self._about["tasks"],
             None if ask is None else self._drag,
         )
+        touching = self._about.get(GROUP, {})
+        self._contacts = ContactScene(self._server, robot, touching) if touching else None
         self._ask = ask
         self._charted = self._drawn = 0.0
         self._shown: tuple[int, bool] | None = None
@@ -135,8 +140,10 @@ class Page:
         trail = self._reader.history(row, _TRAIL_SECONDS, 80, tool)[:, 1:]
         live = self._ask is not None and self._run.follows
         self._scene.show(frame, trail, live)
+        if self._contacts is not None:
+            self._contacts.show(frame)
         self._head.content = panels.head(frame, self._note(live))
-        self._bars.content = panels.tasks(frame)
+        self._bars.content = panels.contacts(frame) + panels.tasks(frame)
         if now - self._charted >= 1.0 / CHARTS or self._run.paused:
             self._charted = now
             self._joints.content = panels.joints(frame, self._reader.joints, self._about["robot"])
@@ -167,6 +174,9 @@ class Page:
                 gui.add_divider()
                 homes = _homes(self._about)
                 self._controls = StackControls(self._server, ask, self._about["tasks"], homes)
+            if ask is not None and self._about.get(GROUP):
+                gui.add_divider()
+                ContactControls(self._server, ask, list(self._about[GROUP]))
         with tabs.add_tab("Joints"):
             self._joints = gui.add_html("")
         self._chart_tab = tabs.add_tab("Charts")
