@@ -237,7 +237,16 @@ def _span(event: Event | None, recording: Recording) -> tuple[float, float] | No
     start = None if event is None else began(event, recording)
     if event is None or start is None or not len(recording) or recording.t[-1] < start:
         return None
+    if event.kind == "remove" and not _there(event.tasks[0], start, recording):
+        return None
     return start, start + event.duration + TAIL
+
+
+def _there(name: str, t: float, recording: Recording) -> bool:
+    """Tell whether a task or a contact was in the stack at a time."""
+    columns = (f"{GROUP}/{name}/progress", f"tasks/{name}/activation")
+    found = next(recording[column] for column in columns if column in recording)
+    return bool(np.isfinite(found[int(np.searchsorted(recording.t, t - TAIL))]))
 
 
 def _force_step(

@@ -67,6 +67,10 @@ Configuration = Annotated[str | tuple[float, ...], Checked(_check_configuration)
 """Joint values, or the name of a configuration of the robot."""
 
 
+ROUNDING = 1e-9
+"""By how much a sum of two times may be off, s."""
+
+
 class HoldEntry(Entry):
     """Stay where the task finds the robot."""
 
@@ -201,8 +205,8 @@ class StopsEntry(Entry, Generic[GoalT, OffsetT]):
     @model_validator(mode="after")
     def _in_turn(self) -> Self:
         for i, (one, following) in enumerate(pairwise(self.moves), start=1):
-            if following.at < one.at + one.duration:
-                end = one.at + one.duration
+            end = one.at + one.duration
+            if following.at < end - ROUNDING:
                 raise problem(f"moves[{i}]: must not begin before {end:g} s", "moves")
         return self
 
