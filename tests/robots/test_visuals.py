@@ -28,7 +28,9 @@ def test_every_robot_has_shapes_of_triangles(name):
         assert np.isfinite(shape.vertices).all()
 
 
-@pytest.mark.parametrize("name", [n for n in ("puma560", "panda", "ur5", "solo12") if n in INSTALLED])
+@pytest.mark.parametrize(
+    "name", [n for n in ("puma560", "panda", "ur5", "solo12") if n in INSTALLED]
+)
 def test_every_shape_moves_with_one_frame_of_the_robot(name):
     """Seen from the frame that it belongs to, a shape is at rest, whatever the configuration."""
     robot = load_robot(name)

@@ -56,11 +56,13 @@ class ContactScene:
         carrying: list[shapes.Place] = []
         for contact in frame.contacts:
             place, there = places[contact.name], shapes.known(contact)
-            tip = shapes.pressure_point(place, contact)
-            forces.append((shapes.arrow(tip, np.nan_to_num(contact.measured), weight), MEASURED))
-            forces.append((shapes.arrow(tip, np.nan_to_num(contact.force), weight), PLANNED))
+            pressed = shapes.pressure_point(place, contact)
+            forces.append(
+                (shapes.arrow(pressed, np.nan_to_num(contact.measured), weight), MEASURED)
+            )
+            forces.append((shapes.arrow(pressed, np.nan_to_num(contact.force), weight), PLANNED))
             ball = self._pressed[contact.name]
-            ball.visible, ball.position = there and contact.activation > 0.0, tip
+            ball.visible, ball.position = there and contact.activation > 0.0, pressed
             if there:
                 color = blend_rgb(contact.progress)
                 used = blend_rgb(1.0 - float(np.nan_to_num(contact.cone_use)))

@@ -71,8 +71,8 @@ def pressure_point(place: Place, contact: ContactFrame) -> np.ndarray:
     return place.point + place.axes[:, :2] @ np.nan_to_num(contact.cop)
 
 
-def arrow(tip: np.ndarray, force: np.ndarray, weight: float) -> np.ndarray:
-    """Draw a force as an arrow that ends where it acts, (k, 2, 3); nothing where it is none."""
+def arrow(start: np.ndarray, force: np.ndarray, weight: float) -> np.ndarray:
+    """Draw a force as an arrow from where it acts, (k, 2, 3); nothing where it is none."""
     size = float(np.linalg.norm(force))
     if not size > 1e-3 * weight:
         return np.empty((0, 2, 3))
@@ -80,8 +80,9 @@ def arrow(tip: np.ndarray, force: np.ndarray, weight: float) -> np.ndarray:
     length = LONGEST * size / weight
     head = min(HEAD * length, MOST_HEAD)
     side = _axes_about(along)[:, 0] * head * 0.5
+    tip = start + length * along
     back = tip - head * along
-    return np.array([[tip - length * along, tip], [tip, back + side], [tip, back - side]])
+    return np.array([[start, tip], [tip, back + side], [tip, back - side]])
 
 
 def cone(place: Place, friction: float) -> np.ndarray:
