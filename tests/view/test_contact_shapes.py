@@ -10,7 +10,7 @@ from opspace.robots import load_robot
 from opspace.view import panels
 from opspace.view.contact_shapes import (
     LONGEST,
-    Place,
+    ContactPlace,
     arrow,
     cone,
     outline,
@@ -33,7 +33,7 @@ def contact(name="foot", progress=1.0, cop=(0.0, 0.0)):
 
 def lying(corners, height=0.0):
     points = np.column_stack([corners, np.full(len(corners), height)])
-    return Place(points[0], np.eye(3), points)
+    return ContactPlace(points[0], np.eye(3), points)
 
 
 @given(POINTS)
@@ -47,7 +47,9 @@ def test_a_support_polygon_is_convex_and_holds_every_corner(points):
 
 
 def test_walls_do_not_carry_the_weight():
-    wall = Place(np.zeros(3), np.array([[0, 0, -1.0], [0, 1, 0], [1, 0, 0]]), np.zeros((1, 3)))
+    wall = ContactPlace(
+        np.zeros(3), np.array([[0, 0, -1.0], [0, 1, 0], [1, 0, 0]]), np.zeros((1, 3))
+    )
     assert len(support([wall])) == 0
     assert len(support([])) == 0
     assert len(outline(np.zeros((1, 3)))) == 0

@@ -202,7 +202,7 @@ def draw(runs: Mapping[str, RunResult], out: Path, *, progress: Any = None) -> l
         SnapshotUnavailableError,
         snapshot_strip,
     )
-    from opspace.plots.humanoid import humanoid_figure  # noqa: PLC0415
+    from opspace.plots.contact_figure import humanoid_figure  # noqa: PLC0415
     from opspace.plots.style import save  # noqa: PLC0415
 
     scenario = load_scenario(SCENARIO)

@@ -53,7 +53,7 @@ class ContactScene:
         places = {name: shapes.place_of(one, self._robot) for name, one in self._about.items()}
         forces: list[tuple[np.ndarray, tuple[int, int, int]]] = []
         cones: list[tuple[np.ndarray, tuple[int, int, int]]] = []
-        carrying: list[shapes.Place] = []
+        carrying: list[shapes.ContactPlace] = []
         for contact in frame.contacts:
             place, there = places[contact.name], shapes.known(contact)
             pressed = shapes.pressure_point(place, contact)

@@ -27,7 +27,7 @@ ABOVE = 0.003
 
 
 @dataclass(frozen=True)
-class Place:
+class ContactPlace:
     """Where a contact is in one tick.
 
     Attributes:
@@ -41,7 +41,7 @@ class Place:
     corners: np.ndarray
 
 
-def place_of(about: Mapping[str, Any], robot: Robot) -> Place:
+def place_of(about: Mapping[str, Any], robot: Robot) -> ContactPlace:
     """Find where a contact is.
 
     Args:
@@ -52,12 +52,12 @@ def place_of(about: Mapping[str, Any], robot: Robot) -> Place:
     rotation = robot.rotation(frame)
     point = robot.position(frame) + rotation @ np.array(about["offset"])
     if about["half"] is None:
-        return Place(point, _axes_about(np.array(about["normal"])), point[None])
+        return ContactPlace(point, _axes_about(np.array(about["normal"])), point[None])
     x, y = about["half"]
     corners = [
         point + rotation @ (a * x, b * y, 0.0) for a, b in ((1, 1), (-1, 1), (-1, -1), (1, -1))
     ]
-    return Place(point, rotation, np.array(corners))
+    return ContactPlace(point, rotation, np.array(corners))
 
 
 def _axes_about(normal: np.ndarray) -> np.ndarray:
@@ -66,7 +66,7 @@ def _axes_about(normal: np.ndarray) -> np.ndarray:
     return np.stack([x, np.cross(normal, x), normal], axis=1)
 
 
-def pressure_point(place: Place, contact: ContactFrame) -> np.ndarray:
+def pressure_point(place: ContactPlace, contact: ContactFrame) -> np.ndarray:
     """Give the centre of pressure in the world, (3,) m."""
     return place.point + place.axes[:, :2] @ np.nan_to_num(contact.cop)
 
@@ -85,7 +85,7 @@ def arrow(start: np.ndarray, force: np.ndarray, weight: float) -> np.ndarray:
     return np.array([[start, tip], [tip, back + side], [tip, back - side]])
 
 
-def cone(place: Place, friction: float) -> np.ndarray:
+def cone(place: ContactPlace, friction: float) -> np.ndarray:
     """Draw the friction pyramid at a contact, (8, 2, 3)."""
     rays = [
         place.point + CONE * place.axes @ (friction * a, friction * b, 1.0)
@@ -102,7 +102,7 @@ def outline(corners: np.ndarray) -> np.ndarray:
     return np.stack([corners, np.roll(corners, -1, axis=0)], axis=1)
 
 
-def support(places: Sequence[Place]) -> np.ndarray:
+def support(places: Sequence[ContactPlace]) -> np.ndarray:
     """Give the polygon over which a robot can stand still, (k, 3) on the ground, in order.
 
     Args:
