@@ -159,6 +159,8 @@ class Ground:
             if board.at <= t:
                 plane = model.geom(f"{PLANES}/{FLOOR}/{board.contact}").id
                 model.geom_pos[plane, 2] = self.height + board.height
+                # The shortcut for shapes that are where their body is, as this one was.
+                model.geom_sameframe[plane] = 0
 
     def forces(self, model: Any, data: Any) -> dict[str, np.ndarray]:
         """Measure what presses on each contact, (3,) N in world axes."""
