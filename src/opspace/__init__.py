@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from opspace.contacts import PointContact as PointContact
     from opspace.contacts import SoleContact as SoleContact
     from opspace.controller import Controller as Controller
+    from opspace.controller.falling import FallRule as FallRule
     from opspace.errors import InputError as InputError
     from opspace.errors import MissingExtraError as MissingExtraError
     from opspace.errors import ModelError as ModelError
@@ -66,6 +67,7 @@ if TYPE_CHECKING:
     from opspace.robots import available_robots as available_robots
     from opspace.robots import load_robot as load_robot
     from opspace.robots.shapes import LinkCapsule as LinkCapsule
+    from opspace.sim import Board as Board
     from opspace.sim import Ground as Ground
     from opspace.sim import Plant as Plant
     from opspace.sim import Surface as Surface
@@ -118,6 +120,7 @@ _NAMES = {
     "opspace.command": "Command ContactStatus Distance LevelStatus Status TaskStatus",
     "opspace.contacts": "GroundContact PointContact SoleContact",
     "opspace.controller": "Controller",
+    "opspace.controller.falling": "FallRule",
     "opspace.errors": (
         "InputError MissingExtraError ModelError ModelWarning OpspaceError RecordingError "
         "RobotStoppedError ScenarioError UnknownNameError"
@@ -138,7 +141,7 @@ _NAMES = {
     ),
     "opspace.plan.calibration": "Calibration",
     "opspace.plan.scales": "Singularity",
-    "opspace.sim": "Ground Plant Surface Wall",
+    "opspace.sim": "Board Ground Plant Surface Wall",
     "opspace.stack": "Stack",
     "opspace.tasks": (
         "ActivationProduct ActivationUnion AngularMomentumTask Ball Box Capsule Chain Circle "

@@ -203,6 +203,7 @@ class Which(str, Enum):
     FORCES = "forces"
     STIFFNESS = "stiffness"
     COLLISIONS = "collisions"
+    HUMANOID = "humanoid"
     ALL = "all"
 
 
@@ -210,16 +211,23 @@ class Which(str, Enum):
 def reproduce(
     which: Annotated[Which, typer.Argument(help="The experiment.")] = Which.ALL,
     robot: Annotated[
-        str | None, typer.Option(help="Name of a robot, or path of a .urdf or .xml file; puma560.")
+        str | None,
+        typer.Option(
+            help="Name of a robot, or path of a .urdf or .xml file. [default: puma560]",
+            show_default=False,
+        ),
     ] = None,
     out: Annotated[Path, typer.Option(help="Directory to write to.")] = Path("results"),
 ) -> None:
     """Repeat the paper's experiments: without the method, with a hard switch, and with it.
 
-    Three more are not part of all, and take minutes: forces touches a table in several ways and wipes
+    Four more are not part of all, and take minutes: forces touches a table in several ways and wipes
     it, stiffness presses on tables from 3e2 to 1e6 N/m, collisions are five scenes of a Panda that would
-    touch something, in five ways.
+    touch something, in five ways, humanoid lifts a foot, reaches, leans, lands and presses.
     """
+    if which is Which.HUMANOID:
+        _reproduce_humanoid(robot, out / "humanoid")
+        return
     if which is Which.COLLISIONS:
         _reproduce_collisions(robot, out)
         return
@@ -233,7 +241,7 @@ def reproduce(
 
     wanted = EXPERIMENTS if which is Which.ALL else (which.value,)
     with ProgressBar() as progress:
-        done = reproduce(wanted, robot, out, progress=progress)
+        done = reproduce(wanted, robot or "puma560", out, progress=progress)
     for found in done:
         print(f"\n{found.experiment.name}: {found.experiment.title}")
         _print_table(*metrics_table({name: run.metrics for name, run in found.runs.items()}))
@@ -282,6 +290,28 @@ def _reproduce_collisions(robot: str | None, out: Path) -> None:
     _print_table(*collisions_table(done))
     for problem in draw_collisions(done, out):
         print(problem, file=sys.stderr)
+    print(f"results: {out}")
+
+
+def _reproduce_humanoid(robot: str | None, out: Path) -> None:
+    from opspace.compare.humanoid import VARIANTS, draw, measures, reproduce_humanoid, table
+    from opspace.errors import InputError
+    from opspace.runs.progress import ProgressBar, counter
+    from opspace.scenario import load_scenario
+
+    scenario = load_scenario("humanoid")
+    if robot not in (None, scenario.robot):
+        raise InputError(f"the humanoid is {scenario.robot!r}, whose soles and times it needs")
+    with ProgressBar() as progress:
+        runs = reproduce_humanoid(out, progress=progress)
+    found = {name: measures(run.recording, scenario) for name, run in runs.items()}
+    _print_table(*table(found))
+    for name, run in runs.items():
+        ended = "" if run.outcome.completed else f", stopped at {run.outcome.t:.2f} s"
+        print(f"{name}: {VARIANTS[name].title}{ended}")
+    with counter("film.gif") as pictures:
+        for problem in draw(runs, out, progress=pictures):
+            print(problem, file=sys.stderr)
     print(f"results: {out}")
 
 

@@ -49,6 +49,8 @@ class Status(IntFlag):
     """A contact that is to go stays, because the others cannot carry what it does."""
     NOT_BALANCED = 65536
     """What was given up is more than 0.3 weights: the robot will fall if this lasts."""
+    FALLING = 1048576
+    """The robot is given up, by the rule that the controller was given: its joints are only damped."""
     FAULT = 8
     """No finite torque was found; the command is bias compensation with damping."""
 

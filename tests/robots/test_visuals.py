@@ -28,14 +28,16 @@ def test_every_robot_has_shapes_of_triangles(name):
         assert np.isfinite(shape.vertices).all()
 
 
-@pytest.mark.parametrize("name", [n for n in ("puma560", "panda", "ur5") if n in INSTALLED])
+@pytest.mark.parametrize(
+    "name", [n for n in ("puma560", "panda", "ur5", "solo12") if n in INSTALLED]
+)
 def test_every_shape_moves_with_one_frame_of_the_robot(name):
     """Seen from the frame that it belongs to, a shape is at rest, whatever the configuration."""
     robot = load_robot(name)
     visuals, rng = visuals_of(robot), np.random.default_rng(1)
     seen = []
     for _ in range(3):
-        q = robot.q_reference + rng.uniform(-0.5, 0.5, robot.nq)
+        q = robot.integrate(robot.q_reference, rng.uniform(-0.5, 0.5, robot.nv), 1.0)
         robot.update(q, np.zeros(robot.nv))
         frames = range(len(robot.frame_names))
         R = np.array([robot.rotation(k) for k in frames])

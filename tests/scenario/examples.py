@@ -125,6 +125,47 @@ events:
   - {at: 0.3, remove: wrist}
 """
 
+STANDING = """\
+robot: g1
+duration: 1
+torque_limits: priority
+contacts:
+  left: {type: sole, frame: left_ankle_roll_link, half: [0.08, 0.02], offset: [0.03, 0, -0.035]}
+  right: {type: sole, frame: right_ankle_roll_link, half: [0.08, 0.02], offset: [0.03, 0, -0.035]}
+  palm:
+    type: point
+    frame: right_rubber_hand
+    normal: [-2, 0, 0]
+    friction: 0.4
+    force: 20
+    max_force: 50
+    present: false
+ground:
+  friction: 0.7
+  time_constant: 0.02
+  walls: [{point: [0.3, 0, 0], normal: [-1, 0, 0]}]
+  boards: [{contact: right, height: -0.01, at: 0.5}]
+falling: {after: 0.1, tilt: 0.5}
+tasks:
+  com:
+    type: com
+    level: 0
+    target:
+      type: stops
+      moves:
+        - {at: 0.1, duration: 0.2, offset: [0, 0.02, 0]}
+        - {at: 0.4, duration: 0.2, goal: [0.03, 0, 0.67]}
+  still: {type: angular_momentum, level: 1, kv: 5}
+  posture: {type: posture, level: 2, kp: 25}
+events:
+  - {at: 0.1, when: {contact: left, force_above: 20, lasting: 0.01}, insert: palm}
+  - {at: 0.1, when: {contact: right, force_below: 5}, remove: right, wait: false}
+  - {at: 0.2, remove: left, duration: 0.2}
+plant:
+  pushes: [{at: 0.1, duration: 0.1, force: [10, 0, 0], frame: pelvis}]
+"""
+"""What only robots with a floating base can be told."""
+
 numbers = st.floats(-1e3, 1e3)
 times = st.floats(1e-3, 1e3)
 gains = st.floats(0.0, 1e6)

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import opspace as osc
-from opspace.errors import InputError
-from opspace.sim import Disturbances, Ground, Wall
+from opspace.errors import InputError, UnknownNameError
+from opspace.sim import Board, Disturbances, Ground, Wall
 
 HALF, OFFSET = (0.085, 0.025), (0.035, 0.0, -0.035)
 WEIGHT = 33.34114202 * 9.81
@@ -93,6 +93,28 @@ def test_a_wall_pushes_out_of_itself():
     assert force[0] < 0.0
     # The robot begins to fall, and the hand slides along the wall at most as hard as friction holds.
     assert np.hypot(force[1], force[2]) < 0.81 * -force[0]
+
+
+def test_a_board_lifts_the_floor_below_one_contact_when_it_comes_and_a_hole_takes_it_away():
+    robot, feet = osc.load_robot("g1"), soles()
+    for height in (0.003, -0.2):
+        ground = Ground(feet, boards=[Board("right", height, 0.02)])
+        plant = osc.Plant(robot, standing(robot), ground=ground)
+        level = osc.Plant(robot, standing(robot), ground=Ground(feet))
+        for _ in range(20):
+            plant.advance(np.zeros(robot.nv))
+            level.advance(np.zeros(robot.nv))
+        assert np.allclose(plant.q, level.q, atol=1e-9)
+        before = plant.contact_forces["right"][2]
+        for _ in range(2):
+            plant.advance(np.zeros(robot.nv))
+        after = plant.contact_forces
+        assert after["right"][2] > 2.0 * before if height > 0.0 else after["right"][2] == 0.0
+        assert after["left"][2] > 0.0
+    with pytest.raises(InputError, match="a height and a time"):
+        Ground(feet, boards=[Board("right", np.nan)])
+    with pytest.raises(UnknownNameError, match="unknown contact of the ground 'tail'"):
+        Ground(feet, boards=[Board("tail", 0.1)])
 
 
 def test_what_cannot_be_is_refused():

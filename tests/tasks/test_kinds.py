@@ -78,4 +78,5 @@ def test_what_a_kind_controls_is_what_its_task_measures(name, kind):
     motion = {"position": "Position", "orientation": "Orientation", "pose": "Pose"}
     found = getattr(task, "quantity", None)
     assert type(found).__name__ == motion.get(kind.controls, "NoneType"), name
-    assert np.all(np.asarray(task.kp) == 100.0)
+    stiffness = 0.0 if kind.controls == "momentum" else 100.0
+    assert np.all(np.asarray(task.kp) == stiffness)

@@ -120,7 +120,7 @@ def _run(scenario: Scenario, name: str, progress: ProgressBar | None) -> Measure
     built = build(method.scenario(scenario), method.controller)
     watch, timed = Watch(built.controller, scenario.events), Timed(built.controller)
     line = progress.run(name, scenario.duration) if progress else None
-    observers = [watch, line] if line else [watch]
+    observers = [watch, built.triggers, *([line] if line else [])]
     stop = StopRule(built.stop.max_joint_speed or GIVE_UP_SPEED, built.stop.max_torque)
     outcome = simulate(built.plant, timed, scenario.duration, observers, stop)
     if line:

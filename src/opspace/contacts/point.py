@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike
 from opspace.contacts.ground_contact import GroundContact
 from opspace.errors import InputError
 from opspace.law.cones import point_cone, point_metric
+from opspace.law.contact_forces import NORMAL
 from opspace.tasks.validation import Array, finite_array
 
 
@@ -56,6 +57,11 @@ class PointContact(GroundContact):
     def surface(self) -> Array:
         """Axes of the surface in the world, (3, 3), as columns, z out of it."""
         return self._surface
+
+    @property
+    def normal(self) -> Array:
+        """Direction out of the surface, (3,) in the world, of length 1."""
+        return self._surface[:, NORMAL].copy()
 
     def cone(self) -> Array:
         """Return the rows of the friction pyramid, (4, 3)."""

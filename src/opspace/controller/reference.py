@@ -14,6 +14,7 @@ from opspace.contacts import GroundContact
 from opspace.controller.changing_payload import Loading
 from opspace.controller.disturbance import DisturbanceObserver
 from opspace.controller.drivable import base_of, check_drivable
+from opspace.controller.falling import FallRule, FallWatch
 from opspace.controller.handover import Handover
 from opspace.controller.integral import IntegralAction
 from opspace.controller.rates import check_damping, check_limits, with_period
@@ -76,6 +77,8 @@ class ReferenceController:
         on_time_jump: What happens when time runs backwards or jumps, see
             `opspace.controller.watchdog.POLICIES`; it needs ``period``.
         collisions: What is kept apart: the robot's own links, and obstacles; None for nothing.
+        falling: When a robot on contacts is given up and only damped; None is never, and tells by
+            ``Status.NOT_BALANCED`` alone.
         law: Torque of task sets, to compare with the library's own; see
             `opspace.controller.stages.Question` for what it is asked.
 
@@ -99,6 +102,7 @@ class ReferenceController:
         period: float | None = None,
         on_time_jump: str = "report",
         collisions: CollisionAvoidance | None = None,
+        falling: FallRule | None = None,
         law: Law = sum_of_hard_torques,
     ) -> None:
         self._blending = blending if isinstance(blending, Blending) else Blending(blending)
@@ -148,6 +152,7 @@ class ReferenceController:
         self._handover: Handover | None = None
         self._last_torque: np.ndarray | None = None
         self._loading: Loading | None = None
+        self._fall = self._watch_for(falling)
         self._plain = self._needs_no_more()
         self._observer = _observer(stack.limits, robot.nv, torque_limits)
         self._rules = Rules(
@@ -162,6 +167,20 @@ class ReferenceController:
             0.0 if period is None else float(period),
             collisions,
         )
+
+    def _watch_for(self, falling: FallRule | None) -> FallWatch | None:
+        """Watch whether the robot falls.
+
+        Raises:
+            InputError: No rule, or a robot that cannot fall.
+        """
+        if falling is None:
+            return None
+        if not isinstance(falling, FallRule):
+            raise InputError(f"falling takes a FallRule, not {type(falling).__name__}")
+        if not self._base:
+            raise InputError(f"robot {self._robot.name!r} is bolted down and does not fall")
+        return FallWatch(falling, self._robot, self.damping)
 
     def _touching(self, contact: GroundContact) -> None:
         """Get a contact ready.
@@ -267,6 +286,8 @@ class ReferenceController:
             self._observer.forget_last()
         if self._loading is not None:
             self._loading.resume()
+        if self._fall is not None:
+            self._fall.forget()
         self.stack.resume()
 
     def hand_back(self, tau: ArrayLike, duration: float = 0.5) -> None:
@@ -295,7 +316,7 @@ class ReferenceController:
 
     def _needs_no_more(self) -> bool:
         """Tell whether a command leaves as the tick has made it."""
-        return not self._robot_adds and self._integral is None
+        return not self._robot_adds and self._integral is None and self._fall is None
 
     def _sensed(self, t: float, wrenches: Wrenches | None, members: Sequence[Member]) -> Status:
         """Hand the wrenches of a tick to the tasks that need them."""
@@ -307,6 +328,9 @@ class ReferenceController:
         """Learn from a tick, leave out what the robot adds, mix with another's torque in a handover."""
         if self._handover is None and self._integral is not None:
             self._integral.after(command, members)
+        if self._fall is not None:
+            command = self._fall.after(command)
+            self._last_torque = command.tau
         added, handover = self._added_by_robot(), self._handover
         if handover is None:
             return command._replace(tau=command.tau - added) if self._robot_adds else command

@@ -14,6 +14,7 @@ from typing import IO, Any
 import numpy as np
 
 from opspace.command import Command
+from opspace.contacts import GroundContact
 from opspace.controller import ReferenceController
 from opspace.errors import InputError, OpspaceError, RecordingError, unknown_name
 from opspace.law import Profile
@@ -24,7 +25,7 @@ from opspace.tasks.validation import finite, finite_array
 KINDS: Mapping[str, frozenset[str]] = MappingProxyType(
     {
         "insert": frozenset({"level", "duration"}),
-        "remove": frozenset({"duration"}),
+        "remove": frozenset({"duration", "wait"}),
         "move": frozenset({"level", "duration"}),
         "swap": frozenset({"duration"}),
         "lead": frozenset({"position", "orientation"}),
@@ -37,12 +38,7 @@ KINDS: Mapping[str, frozenset[str]] = MappingProxyType(
 FILE = "requests.jsonl"
 """Name of the file beside a recording that tells what was asked for during the run."""
 
-_NEEDED = {
-    "insert": ("level",),
-    "move": ("level",),
-    "gain": ("kp",),
-    "place": ("obstacle", "position"),
-}
+_NEEDED = {"move": ("level",), "gain": ("kp",), "place": ("obstacle", "position")}
 _TASKS = {"swap": 2, "place": 0}
 
 
@@ -52,13 +48,14 @@ class RunRequest:
 
     Attributes:
         kind: One of `KINDS`.
-        tasks: Name of the task, or of the two that swap.
-        level: Number of the level, for insert and move.
+        tasks: Name of the task or contact, or of the two tasks that swap.
+        level: Number of the level, for move and for insert of a task; contacts have none.
         duration: How long it takes, s; not for lead, which takes as long as its way.
         position: (3,) where to lead to, m.
         orientation: Quaternion wxyz to lead to.
         kp: Stiffness to come to, 1/s².
         obstacle: Name of the obstacle to lead to a position; then there is no task.
+        wait: Of a contact to remove, see `opspace.Stack.remove`.
 
     Raises:
         InputError: Something that this kind does not take, or lacks.
@@ -72,6 +69,7 @@ class RunRequest:
     position: tuple[float, ...] | None = None
     orientation: tuple[float, ...] | None = None
     kp: float | None = None
+    wait: bool | None = None
     obstacle: str | None = None
 
     @property
@@ -109,6 +107,8 @@ class RunRequest:
         for name in ("duration", "kp"):
             if (getattr(self, name) or 0.0) < 0.0:
                 raise InputError(f"{what} {name} must be at least 0, not {getattr(self, name)}")
+        if not (self.wait is None or isinstance(self.wait, bool)):
+            raise InputError(f"{what} wait must be true or false, not {self.wait!r}")
         for name, size in (("position", 3), ("orientation", 4)):
             value = getattr(self, name)
             if value is not None:
@@ -191,15 +191,22 @@ class Changes:
     Args:
         controller: The controller.
         tasks: The tasks that requests may name; those in the stack are known anyway.
+        contacts: The contacts that requests may name, in the same way.
     """
 
-    def __init__(self, controller: ReferenceController, tasks: Iterable[Task] = ()) -> None:
+    def __init__(
+        self,
+        controller: ReferenceController,
+        tasks: Iterable[Task] = (),
+        contacts: Iterable[GroundContact] = (),
+    ) -> None:
         self._controller = controller
         late = list(tasks)
         for task in late:
             # Names are looked up now: a task may be led before it is inserted.
             controller.stack.prepare(task)
         self._tasks = {task.name: task for task in [*late, *controller.stack]}
+        self._contacts = {one.name: one for one in [*contacts, *controller.stack.contacts.values()]}
         self._ramps: dict[str, _GainRamp] = {}
 
     def apply(self, request: RunRequest, t: float) -> None:
@@ -216,14 +223,19 @@ class Changes:
         if request.kind == "place":
             self._place(request, t)
             return
-        task = self._task(request.tasks[0])
         duration = 0.5 if request.duration is None else request.duration
+        contact = self._contacts.get(request.tasks[0])
+        if contact is not None:
+            self._change_contact(contact, request, duration)
+            return
+        task = self._task(request.tasks[0])
         match request.kind:
             case "insert":
-                assert request.level is not None
+                if request.level is None:
+                    raise InputError(f"request 'insert' of the task {task.name!r} needs level")
                 stack.insert(task, request.level, duration)
             case "remove":
-                stack.remove(task, duration)
+                stack.remove(task, duration, wait=request.wait)
             case "move":
                 assert request.level is not None
                 stack.move(task, request.level, duration)
@@ -240,6 +252,22 @@ class Changes:
     def moving(self) -> bool:
         """Whether a gain is on its way."""
         return bool(self._ramps)
+
+    def _change_contact(self, contact: GroundContact, request: RunRequest, duration: float) -> None:
+        """Let a contact come or go.
+
+        Raises:
+            InputError: Anything else is asked of it.
+        """
+        if request.kind == "remove":
+            self._controller.stack.remove(contact, duration, wait=request.wait)
+        elif request.kind == "insert" and request.level is None:
+            self._controller.stack.insert(contact, duration)
+        else:
+            raise InputError(
+                f"{contact.name!r} is a contact: it has no level, target or gain, and can be asked "
+                "to insert and remove only"
+            )
 
     def follow(self, t: float) -> None:
         """Move on what takes time: the gains on their way at time ``t`` [s]."""
@@ -267,7 +295,7 @@ class Changes:
         try:
             return self._tasks[name]
         except KeyError:
-            raise unknown_name("task", name, self._tasks) from None
+            raise unknown_name("task", name, [*self._tasks, *self._contacts]) from None
 
 
 class RequestDesk:

@@ -43,7 +43,7 @@ def film(
     task: str = "position",
     progress: Callable[[int, int], None] | None = None,
 ) -> Path:
-    """Write a run as a moving picture, with the time and the tasks' activations beside it.
+    """Write a run as a moving picture, with the time and the activations beside it.
 
     Args:
         recording: The run.
@@ -91,7 +91,7 @@ def film(
 
 
 def _captioned(image: np.ndarray, time: float, found: Mapping[str, float]) -> Image.Image:
-    """Put the time, and a bar for the activation of every task, on a band beside the picture."""
+    """Put the time, and a bar for every activation, on a band beside the picture."""
     height, width = image.shape[:2]
     k = max(1.0, height / SIZES[".gif"][1])
     band = round(BAND * k)
@@ -103,7 +103,7 @@ def _captioned(image: np.ndarray, time: float, found: Mapping[str, float]) -> Im
     top = 26 * k
     for column, activation in found.items():
         parts = column.split("/")
-        if parts[0] != "tasks" or parts[-1] != "activation":
+        if parts[0] not in ("tasks", "contacts") or parts[-1] != "activation":
             continue
         h = 0.0 if math.isnan(activation) else activation
         bar = (8 * k, top + 2 * k, 48 * k, top + 10 * k)

@@ -8,8 +8,10 @@ from pathlib import Path
 import numpy as np
 
 from opspace.command import Command, LevelStatus, TaskStatus
+from opspace.contacts import GroundContact
 from opspace.controller import ReferenceController
 from opspace.errors import InputError
+from opspace.record.contact_columns import Felt, columns_of_contacts, row_of_contacts
 from opspace.record.format import Column, Ended
 from opspace.record.obstacle_columns import CollisionRows, columns_of_collisions
 from opspace.record.subject import subject_of
@@ -22,7 +24,7 @@ from opspace.record.wrench_columns import (
 )
 from opspace.record.writer import Recorder
 from opspace.robots import Robot
-from opspace.robots.joint_units import effort_unit, joint_units
+from opspace.robots.joint_units import coordinates, effort_unit, joint_units
 from opspace.tasks import Task
 
 State = Callable[[], tuple[np.ndarray, np.ndarray]]
@@ -43,7 +45,7 @@ def state_columns(robot: Robot) -> list[Column]:
     joints = list(zip(robot.joint_names, joint_units(robot), strict=True))
     return [
         Column("t", "s", "time"),
-        *(Column(f"q/{j}", unit, f"joint position of {j}") for j, unit in joints),
+        *(Column(f"q/{j}", unit, f"joint position of {j}") for j, unit in coordinates(robot)),
         *(Column(f"v/{j}", f"{unit}/s", f"joint velocity of {j}") for j, unit in joints),
         *(
             Column(f"tau/{j}", effort_unit(unit), f"commanded joint torque, bias included of {j}")
@@ -56,6 +58,8 @@ def columns_of(
     controller: ReferenceController,
     tasks: Sequence[Task] = (),
     levels: Mapping[float, Sequence[Task]] | None = None,
+    contacts: Sequence[GroundContact] | None = None,
+    measured: bool = False,
 ) -> list[Column]:
     """List the columns of a controller's recording, in the order of `TickRecorder`'s rows.
 
@@ -63,6 +67,8 @@ def columns_of(
         controller: The controller that will be recorded.
         tasks: Prepared tasks that will be in its stack later.
         levels: Tasks that may be at each level, by its number; None takes those of the stack.
+        contacts: Contacts that may ever be there; None takes those of the stack.
+        measured: Whether the forces on them are measured.
 
     Returns:
         Columns with names, units and descriptions.
@@ -105,8 +111,12 @@ def columns_of(
     if controller.collisions is not None:
         columns += columns_of_collisions(controller.collisions)
     recorded = [*stack, *tasks]
+    touching = list(stack.contacts.values()) if contacts is None else contacts
+    if robot.floating_base:
+        columns += [Column(f"com/{a}", "m", f"centre of mass, {a}") for a in "xyz"]
     return [
         *columns,
+        *columns_of_contacts(touching, measured=measured),
         *columns_of_wrenches(sensors_of(recorded)),
         *columns_of_touches(recorded),
         Column("hard_solves", "1", "hard torques in the blend"),
@@ -130,6 +140,8 @@ class TickRecorder:
         levels: Tasks that may ever be at each level, by its number; None takes those of the stack.
         truth: Tells the true state where the sensors are noisy; it is recorded as ``true/q`` and
             ``true/v``. None where the measured state is the true one.
+        contacts: Contacts that will be inserted later, beside those of the stack.
+        felt: Tells the forces on the contacts where they are measured.
         overwrite: Replace a recording that is already there.
 
     Raises:
@@ -147,6 +159,8 @@ class TickRecorder:
         tasks: Sequence[Task] = (),
         levels: Mapping[float, Sequence[Task]] | None = None,
         truth: State | None = None,
+        contacts: Sequence[GroundContact] = (),
+        felt: Felt | None = None,
         overwrite: bool = False,
     ) -> None:
         stack = controller.stack
@@ -165,10 +179,13 @@ class TickRecorder:
         self._truth = truth
         guard = controller.collisions
         self._apart = None if guard is None else CollisionRows(controller, guard)
-        columns = columns_of(controller, tasks, levels)
+        self._contacts = {one.name: one for one in [*stack.contacts.values(), *contacts]}
+        self._felt = felt
+        touching = list(self._contacts.values())
+        columns = columns_of(controller, tasks, levels, touching, felt is not None)
         if truth is not None:
             columns += _truth_columns(controller)
-        about = {**subject_of(controller, tasks), **header}
+        about = {**subject_of(controller, tasks, touching), **header}
         self._recorder = Recorder(directory, columns, about, overwrite=overwrite)
 
     def observe(self, q: np.ndarray, v: np.ndarray, command: Command) -> None:
@@ -194,6 +211,10 @@ class TickRecorder:
             parts.append([limits.get(s.name, 0.0) for s in controller.stack.limits.sides])
         if self._apart is not None:
             parts += self._apart.row(command.distances)
+        if controller.robot.floating_base:
+            parts.append(controller.robot.com_position())
+        felt = None if self._felt is None else self._felt()
+        parts += row_of_contacts(list(self._contacts.values()), command.contacts, felt)
         parts += row_of_wrenches(controller.wrenches, self._sensors)
         parts += row_of_touches(list(self._tasks.values()))
         parts.append([float(command.hard_solves), float(command.status)])
@@ -226,10 +247,14 @@ def _level(found: TaskStatus) -> float:
 
 
 def _truth_columns(controller: ReferenceController) -> list[Column]:
+    robot = controller.robot
+    speeds = zip(robot.joint_names, joint_units(robot), strict=True)
+    named = [("q", "joint position", coordinates(robot))]
+    named.append(("v", "joint velocity", tuple((j, f"{unit}/s") for j, unit in speeds)))
     return [
-        Column(f"true/{group}/{j}", unit + rate, f"{what} of {j}, without the sensors' noise")
-        for group, rate, what in (("q", "", "joint position"), ("v", "/s", "joint velocity"))
-        for j, unit in zip(controller.robot.joint_names, joint_units(controller.robot), strict=True)
+        Column(f"true/{group}/{j}", unit, f"{what} of {j}, without the sensors' noise")
+        for group, what, numbers in named
+        for j, unit in numbers
     ]
 
 

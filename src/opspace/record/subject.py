@@ -7,7 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from opspace.contacts import GroundContact
 from opspace.controller import ReferenceController
+from opspace.record.contact_columns import GROUP, subject_of_contact
 from opspace.record.obstacle_columns import HEADER_KEY, about_collisions
 from opspace.robots.adapter import added_frames, held_joints
 from opspace.robots.catalogue import CATALOGUE, locate
@@ -20,18 +22,24 @@ from opspace.tasks.motions import CenterOfMass, WorldFrame
 from opspace.tasks.quantities import Orientation, Position
 
 
-def subject_of(controller: ReferenceController, tasks: Sequence[Task] = ()) -> dict[str, Any]:
-    """Describe robot and tasks in JSON's own types.
+def subject_of(
+    controller: ReferenceController,
+    tasks: Sequence[Task] = (),
+    contacts: Sequence[GroundContact] = (),
+) -> dict[str, Any]:
+    """Describe robot, tasks and contacts in JSON's own types.
 
     Args:
         controller: The controller that is recorded.
         tasks: Tasks that are not in its stack yet.
+        contacts: Contacts that are there or may come.
 
     Returns:
         ``robot`` (name or file, joints, their units and limits in rad or m, torque limits, the buffer
         before a limit in rad or m, and by limit the acceleration that its joint brakes with; null
-        where there is none) and ``tasks`` (units, stiffness, level, and what its target can be led
-        to); ``collisions``, see
+        where there is none), ``tasks`` (units, stiffness, level, and what its target can be led
+        to), ``contacts`` (frame, offset in m, friction, half the sides of a sole in m, normal of a
+        point), which only robots with a floating base have, and ``collisions``, see
         `opspace.record.obstacle_columns.about_collisions`, where something is kept apart.
     """
     stack = controller.stack
@@ -44,6 +52,8 @@ def subject_of(controller: ReferenceController, tasks: Sequence[Task] = ()) -> d
     about = {"robot": _robot(controller), "tasks": found}
     if controller.collisions is not None:
         about[HEADER_KEY] = about_collisions(controller.collisions)
+    if contacts:
+        about[GROUP] = {one.name: subject_of_contact(one) for one in contacts}
     return about
 
 

@@ -102,12 +102,17 @@ def visuals_of(robot: Robot) -> Visuals:
     return _MujocoVisuals(model_of(robot), spread_of(robot))
 
 
+QUATERNION = 4
+"""Coordinates of a joint that turns freely."""
+
+
 class _UrdfVisuals:
     """Meshes of a URDF, read and placed by Pinocchio."""
 
     def __init__(self, path: Path, robot: Robot) -> None:
         free = robot.floating_base
         self._model = model_from_urdf(read_urdf(path, held_joints(robot), free), free)
+        self._quaternions = [j.idx_q for j in self._model.joints if j.nq == QUATERNION]
         self._spread = spread_of(robot)
         self._data = self._model.createData()
         directories = [str(parent) for parent in path.resolve().parents[:PACKAGE_DEPTH]]
@@ -123,7 +128,10 @@ class _UrdfVisuals:
 
     def poses(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """See `Visuals.poses`."""
-        q = q if self._spread is None else self._spread.positions(q)
+        q = np.array(q if self._spread is None else self._spread.positions(q))
+        for start in self._quaternions:  # Pinocchio writes them xyzw
+            end = start + QUATERNION
+            q[start:end] = np.roll(q[start:end], -1)
         pin.forwardKinematics(self._model, self._data, q)
         pin.updateGeometryPlacements(self._model, self._data, self._geometry, self._placed)
         places = [pin.SE3ToXYZQUAT(place) for place in self._placed.oMg]

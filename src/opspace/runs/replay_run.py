@@ -4,11 +4,16 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
+
+from opspace.command import Command
 from opspace.errors import RecordingError
-from opspace.loop.requests import FILE, Changes, RequestPlayer
+from opspace.loop.requests import FILE, RequestPlayer
 from opspace.record import load
+from opspace.record.contact_columns import felt_in
 from opspace.record.replay import Replay
 from opspace.record.replay import replay as replay_with
+from opspace.runs.run import changes_of
 from opspace.scenario.build import SCENARIO_KEY, build
 from opspace.scenario.load import scenario_from
 
@@ -36,8 +41,15 @@ def replay(directory: Path) -> Replay:
             "replays it in Python with the controller that it was made with"
         )
     built = build(scenario_from(scenario))
+    forces = iter(felt_in(recording))
+    built.triggers.feel = lambda: next(forces, {})
     asked = recording.directory / FILE
     if not asked.exists():
-        return replay_with(recording, built.controller)
-    player = RequestPlayer(Changes(built.controller, built.tasks.values()), asked)
-    return replay_with(recording, built.controller, player.observe)
+        return replay_with(recording, built.controller, built.triggers.observe)
+    player = RequestPlayer(changes_of(built), asked)
+
+    def observe(q: np.ndarray, v: np.ndarray, command: Command) -> None:
+        built.triggers.observe(q, v, command)
+        player.observe(q, v, command)
+
+    return replay_with(recording, built.controller, observe)

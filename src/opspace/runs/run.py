@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from opspace.controller import Controller, ReferenceController
 from opspace.loop import Observer, Outcome, simulate
@@ -76,7 +77,7 @@ def run_scenario(
     watching: list[Observer] = []
     asked = None
     if requests is not None:
-        watching.append(RequestPlayer(Changes(built.controller, built.tasks.values()), requests))
+        watching.append(RequestPlayer(changes_of(built), requests))
         asked = requests.read_bytes()
     recorder = TickRecorder(
         out,
@@ -85,6 +86,7 @@ def run_scenario(
         tasks=late_tasks_of(built),
         levels=recorded_levels(built, everywhere=requests is not None),
         truth=truth_of(built.plant),
+        **touching_in(built),
         overwrite=overwrite,
     )
     begin(out, scenario)
@@ -121,6 +123,19 @@ def recorded_levels(built: Built, *, everywhere: bool) -> dict[float, list[Task]
 def truth_of(plant: Plant) -> State | None:
     """Return what tells the true state where the sensors are noisy."""
     return (lambda: (plant.q, plant.v)) if plant.noisy else None
+
+
+def touching_in(built: Built) -> dict[str, Any]:
+    """Collect what a recorder is told about contacts."""
+    if not built.contacts:
+        return {}
+    plant = built.plant
+    return {"contacts": list(built.contacts.values()), "felt": lambda: plant.contact_forces}
+
+
+def changes_of(built: Built) -> Changes:
+    """Make what applies requests to a scenario."""
+    return Changes(built.controller, built.tasks.values(), built.contacts.values())
 
 
 def begin(out: Path, scenario: Scenario) -> None:
@@ -160,7 +175,7 @@ def _simulate(built: Built, recorder: TickRecorder, watching: list[Observer]) ->
             built.plant,
             built.controller,
             built.scenario.duration,
-            [recorder, *watching],
+            [recorder, built.triggers, *watching],
             built.stop,
         )
     except KeyboardInterrupt:

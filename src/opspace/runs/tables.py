@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from opspace.record import Recording
 from opspace.robots.joint_units import effort_unit
 from opspace.runs.check import JointReport
+from opspace.runs.event_times import began
 from opspace.runs.metrics import UNITS, Metrics, largest_torque_step
 from opspace.scenario.events import Event, in_order
 
@@ -42,15 +43,21 @@ def timeline_table(
 
     Returns:
         Heads with units, and rows; the torque step is the largest of any joint between two ticks
-        from the beginning of the event to its end.
+        from the beginning of the event to its end. An event that waited for what did not happen has
+        no times.
     """
     heads = ["from [s]", "to [s]", "event", "level", "largest torque step [N·m]"]
     rows = []
     for _, event in in_order(events):
         what = f"{event.kind} {', '.join(event.tasks)}"
         level = "-" if event.level is None else f"{event.level:g}"
-        step = largest_torque_step(recording, event.at, event.end)
-        rows.append([f"{event.at:.3f}", f"{event.end:.3f}", what, level, _written(step)])
+        start = began(event, recording)
+        if start is None:
+            rows.append(["-", "-", what, level, "-"])
+            continue
+        end = start + event.duration
+        step = largest_torque_step(recording, start, end)
+        rows.append([f"{start:.3f}", f"{end:.3f}", what, level, _written(step)])
     return heads, rows
 
 

@@ -14,6 +14,7 @@ from opspace.runs.run import (
     late_tasks_of,
     recorded_levels,
     result_of,
+    touching_in,
     truth_of,
 )
 from opspace.scenario.build import Built, build
@@ -71,6 +72,7 @@ def watch_scenario(
         tasks=late_tasks_of(built),
         levels=recorded_levels(built, everywhere=True),
         truth=truth_of(built.plant),
+        **touching_in(built),
         overwrite=overwrite,
         speed=speed,
         host=host,
@@ -90,7 +92,7 @@ def _run(built: Built, viewer: Viewer, duration: float) -> Outcome:
     """Run until somebody has seen enough; Ctrl-C is how one says so."""
     plant = built.plant
     try:
-        outcome = simulate(plant, built.controller, duration, [viewer], built.stop)
+        outcome = simulate(plant, built.controller, duration, [viewer, built.triggers], built.stop)
     except KeyboardInterrupt:
         viewer.end("interrupted")
         return Outcome(False, plant.t, "interrupted")

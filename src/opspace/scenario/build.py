@@ -8,21 +8,26 @@ from typing import Any
 
 import numpy as np
 
-from opspace.controller import Controller, ReferenceController
+from opspace.contacts import GroundContact
+from opspace.controller import Controller, FallRule, ReferenceController
 from opspace.errors import InputError, OpspaceError, UnknownNameError
 from opspace.loop import StopRule
 from opspace.plan.scales import Singularity
 from opspace.robots import Robot, load_robot
+from opspace.scenario.build_contacts import build_contacts, build_ground, set_down
 from opspace.scenario.build_tasks import build_tasks, check_configuration, configuration
-from opspace.scenario.events import in_order, insertion_level, late_tasks
+from opspace.scenario.events import Event, depending, in_order, insertion_level, late_tasks
 from opspace.scenario.load import to_dict
 from opspace.scenario.schema import Scenario
+from opspace.scenario.triggers import Ask, Triggers
 from opspace.sim import Disturbances, Plant, Push
 from opspace.stack import Stack
 from opspace.tasks import JointLimits, Task
 
 SWITCH = "step"
 """Activation profile of the method ``switch``."""
+SUBSTEPS = 2
+"""Steps of the simulation in each tick of a robot on contacts."""
 SCENARIO_KEY = "scenario"
 """Where the header of a recording holds its scenario."""
 
@@ -39,6 +44,8 @@ class Built:
         controller: The controller.
         plant: The simulated robot at the start of the run.
         stop: When the run is given up.
+        contacts: Every contact by name, those included that events insert.
+        triggers: Starts the events that wait for something to be felt; an observer of the run.
     """
 
     scenario: Scenario
@@ -48,6 +55,8 @@ class Built:
     controller: ReferenceController
     plant: Plant
     stop: StopRule
+    contacts: Mapping[str, GroundContact]
+    triggers: Triggers
 
     @property
     def header(self) -> dict[str, Any]:
@@ -72,10 +81,13 @@ def build(scenario: Scenario, controller: Callable[..., ReferenceController] = C
         MissingExtraError: The robot or the simulator is not installed.
     """
     robot = build_robot(scenario)
-    q = _start(scenario, robot)
+    contacts = build_contacts(scenario, robot)
+    late = late_tasks(scenario.events, scenario.contacts)
+    touching = [contact for name, contact in contacts.items() if name not in late]
+    q = set_down(scenario, robot, _start(scenario, robot), touching)
     robot.update(q, np.zeros(robot.nv))
     tasks = build_tasks(scenario, robot)
-    stack = Stack(_levels(scenario, tasks), limits=_joint_limits(scenario))
+    stack = Stack(_levels(scenario, tasks), limits=_joint_limits(scenario), contacts=touching)
     kept_apart = _collisions(scenario, robot)
     try:
         driver = controller(
@@ -86,18 +98,29 @@ def build(scenario: Scenario, controller: Callable[..., ReferenceController] = C
             bias=scenario.bias,
             singularity=_singularity(scenario),
             **kept_apart,
+            **_falling(scenario),
         )
     except (InputError, UnknownNameError) as error:
         raise scenario.error(
             ("joint_limits", *_unknown_joints(scenario, robot)), str(error)
         ) from error
-    _schedule(scenario, stack, tasks)
-    plant = _plant(scenario, robot, q)
+    plant = _plant(scenario, robot, q, contacts)
+    members = {**tasks, **contacts}
+    open_members = depending(scenario.events)
+    triggers = Triggers(lambda: plant.contact_forces, contacts)
+    for place, event in in_order(scenario.events):
+        ask = _request(scenario, stack, members, place, event)
+        if event.when is None and not set(event.tasks) & open_members:
+            ask(event.at)
+        else:
+            triggers.wait(event, ask)
     stop = StopRule(scenario.stop.max_joint_speed, scenario.stop.max_torque)
-    return Built(scenario, robot, stack, tasks, driver, plant, stop)
+    return Built(scenario, robot, stack, tasks, driver, plant, stop, contacts, triggers)
 
 
-def _plant(scenario: Scenario, robot: Robot, q: np.ndarray) -> Plant:
+def _plant(
+    scenario: Scenario, robot: Robot, q: np.ndarray, contacts: Mapping[str, GroundContact]
+) -> Plant:
     option = scenario.plant
     try:
         return Plant(
@@ -115,11 +138,15 @@ def _plant(scenario: Scenario, robot: Robot, q: np.ndarray) -> Plant:
                 velocity_noise=option.velocity_noise,
                 wrench_noise=option.wrench_noise,
                 wrench_delay=option.wrench_delay,
-                pushes=[Push(push.at, push.duration, push.force) for push in option.pushes],
+                pushes=[
+                    Push(push.at, push.duration, push.force, push.frame) for push in option.pushes
+                ],
                 seed=scenario.seed,
             ),
+            ground=build_ground(scenario, contacts),
+            substeps=SUBSTEPS if contacts else None,
         )
-    except InputError as error:
+    except (InputError, UnknownNameError) as error:
         raise scenario.error(("plant",), str(error)) from error
 
 
@@ -172,27 +199,49 @@ def _levels(scenario: Scenario, tasks: Mapping[str, Task]) -> dict[float, list[T
     return by_level
 
 
-def _schedule(scenario: Scenario, stack: Stack, tasks: Mapping[str, Task]) -> None:
-    """Ask the stack for every event, to start at its time."""
-    for place, event in in_order(scenario.events):
-        smooth = scenario.method == "transition"
-        duration = event.duration if smooth else 0.0
-        profile = event.profile if smooth else SWITCH
-        first, last = tasks[event.tasks[0]], tasks[event.tasks[-1]]
+def _request(
+    scenario: Scenario,
+    stack: Stack,
+    members: Mapping[str, Task | GroundContact],
+    place: int,
+    event: Event,
+) -> Ask:
+    """Make what asks the stack for an event, to start at a time [s], or at once where it is None."""
+    smooth = scenario.method == "transition"
+    duration = event.duration if smooth else 0.0
+    profile = event.profile if smooth else SWITCH
+    first, last = members[event.tasks[0]], members[event.tasks[-1]]
+
+    def ask(at: float | None) -> None:
+        if at is None and event.kind == "remove" and not _there(stack, first):
+            return  # what it waited for has not come
+        timing: Any = {"profile": profile, "start_time": at}
         try:
             match event.kind:
                 case "insert":
-                    level = insertion_level(event, scenario.tasks)
-                    stack.insert(first, level, duration, profile=profile, start_time=event.at)
+                    if isinstance(first, GroundContact):
+                        stack.insert(first, duration, **timing)
+                    else:
+                        level = insertion_level(event, scenario.tasks)
+                        stack.insert(first, level, duration, **timing)
                 case "remove":
-                    stack.remove(first, duration, profile=profile, start_time=event.at)
+                    stack.remove(first, duration, wait=event.wait, **timing)
                 case "move":
+                    assert isinstance(first, Task)
                     assert event.level is not None
-                    stack.move(first, event.level, duration, profile=profile, start_time=event.at)
+                    stack.move(first, event.level, duration, **timing)
                 case "swap":
-                    stack.swap(first, last, duration, profile=profile, start_time=event.at)
+                    assert isinstance(first, Task)
+                    assert isinstance(last, Task)
+                    stack.swap(first, last, duration, **timing)
         except OpspaceError as error:
             raise scenario.error(("events", place), str(error)) from error
+
+    return ask
+
+
+def _there(stack: Stack, member: Task | GroundContact) -> bool:
+    return member.name in stack.contacts or member in stack
 
 
 def _joint_limits(scenario: Scenario) -> JointLimits | None:
@@ -221,6 +270,14 @@ def _collisions(scenario: Scenario, robot: Robot) -> dict[str, Any]:
     except OpspaceError as error:
         raise scenario.error(("collisions",), str(error)) from error
     return {"collisions": guard}
+
+
+def _falling(scenario: Scenario) -> dict[str, Any]:
+    """Make the rule by which a robot on contacts is given up; the option of a controller."""
+    option = scenario.falling
+    if option is None or not scenario.contacts:
+        return {}
+    return {"falling": FallRule(option.after, option.tilt)}
 
 
 def _unknown_joints(scenario: Scenario, robot: Robot) -> tuple[str, ...]:

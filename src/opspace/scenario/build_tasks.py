@@ -13,7 +13,7 @@ from opspace.scenario.document import Key
 from opspace.scenario.references import Values, as_reference, build_target, rotations, vectors
 from opspace.scenario.schema import Scenario
 from opspace.scenario.targets import PoseParts
-from opspace.scenario.task_entries import TaskEntry
+from opspace.scenario.task_entries import PlacedEntry, TaskEntry
 from opspace.scenario.touches import join_touches
 from opspace.tasks import TASK_KINDS, PoseReference, PostureTask, Task
 from opspace.tasks.joint_layout import joint_layout
@@ -50,7 +50,7 @@ def build_tasks(scenario: Scenario, robot: Robot) -> dict[str, Task]:
         except OpspaceError as error:
             raise scenario.error(("tasks", name), str(error)) from error
         try:
-            if isinstance(task, TrackingTask):
+            if isinstance(task, TrackingTask) and isinstance(entry, TaskEntry):
                 task.target = _target(task, entry, robot)
         except OpspaceError as error:
             raise scenario.error(("tasks", name, "target"), str(error)) from error
@@ -80,7 +80,7 @@ def configuration(value: str | tuple[float, ...], robot: Robot) -> Array:
     return np.array(known[value])
 
 
-def _unknown_names(entry: TaskEntry, robot: Robot) -> Iterator[tuple[Key, str]]:
+def _unknown_names(entry: PlacedEntry, robot: Robot) -> Iterator[tuple[Key, str]]:
     """Find names of frames and joints that the robot does not have."""
     for key in ("frame", "reference_frame"):
         frame = getattr(entry, key, None)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from pydantic import Field, model_validator
 
 from opspace.law import PROFILES
+from opspace.scenario.contact_entries import AnyContact
 from opspace.scenario.fields import Checked, Entry, Number, listed, problem, shown
 from opspace.scenario.task_entries import AnyTask
 
@@ -35,15 +36,54 @@ def _pair(value: Any) -> tuple[str, str]:
     return value[0], value[1]
 
 
+class WhenEntry(Entry):
+    """What must be felt for an event to start; it starts once."""
+
+    contact: str = Field(description="contact whose measured normal force is watched")
+    force_above: Annotated[float, Number("N", at_least=0.0)] | None = Field(
+        default=None, description="it touches: the force is above this [N]"
+    )
+    force_below: Annotated[float, Number("N", above=0.0)] | None = Field(
+        default=None,
+        description="it is lost: the contact is fully in and the force below this [N]",
+    )
+    lasting: Annotated[float, Number("s", at_least=0.0)] = Field(
+        default=0.0, description="how long that must have lasted [s]"
+    )
+
+    @model_validator(mode="after")
+    def _one_sign(self) -> Self:
+        if (self.force_above is None) == (self.force_below is None):
+            raise problem("needs either the key 'force_above' or the key 'force_below'")
+        return self
+
+    def holds(self, force: float, present: float) -> bool:
+        """Tell whether it is felt now.
+
+        Args:
+            force: Measured normal force, N.
+            present: Progress of the contact, 0 where it is not in the stack.
+        """
+        if self.force_above is not None:
+            return force > self.force_above
+        assert self.force_below is not None
+        return present == 1.0 and force < self.force_below
+
+
 class Event(Entry):
     """One change of the stack: insert, remove, move or swap, with its time.
 
-    A task whose first event is ``insert`` is not in the stack before it.
+    A task or a contact whose first event is ``insert`` is not in the stack before it.
     """
 
-    at: Annotated[float, Number("s", at_least=0.0)] = Field(description="when it starts [s]")
-    insert: str | None = Field(default=None, description="task that comes")
-    remove: str | None = Field(default=None, description="task that goes")
+    at: Annotated[float, Number("s", at_least=0.0)] = Field(
+        description="when it starts [s]; with when the earliest time"
+    )
+    when: WhenEntry | None = Field(
+        default=None, description="what must be felt for it to start; null is nothing"
+    )
+    insert: str | None = Field(default=None, description="task or contact that comes")
+    remove: str | None = Field(default=None, description="task or contact that goes")
     move: str | None = Field(default=None, description="task that gets another level")
     swap: Annotated[tuple[str, str], Checked(_pair)] | None = Field(
         default=None, description="two tasks that exchange their levels"
@@ -57,6 +97,11 @@ class Event(Entry):
         default=0.5, description="how long it takes [s]; 0 is a hard switch"
     )
     profile: ProfileName = Field(default="quintic", description="shape of the activation in time")
+    wait: bool | None = Field(
+        default=None,
+        description="of a contact that goes: no faster than the others can carry (true, which null "
+        "is as well), or whatever falls",
+    )
 
     @model_validator(mode="after")
     def _check_kind(self) -> Self:
@@ -68,6 +113,8 @@ class Event(Entry):
             raise problem("is missing (number of the level that the task moves to)", "level")
         if self.kind in {"remove", "swap"} and self.level is not None:
             raise problem(f"{self.kind} takes no level", "level")
+        if self.kind != "remove" and self.wait is not None:
+            raise problem(f"{self.kind} takes no wait", "wait")
         return self
 
     @property
@@ -87,20 +134,36 @@ class Event(Entry):
         return self.at + self.duration
 
 
-def check_events(events: Sequence[Event], tasks: Mapping[str, AnyTask]) -> None:
-    """Refuse an event about a task that the scenario does not have.
+def check_events(
+    events: Sequence[Event],
+    tasks: Mapping[str, AnyTask],
+    contacts: Mapping[str, AnyContact],
+) -> None:
+    """Refuse an event about what the scenario does not have, or that its subject cannot do.
 
     Args:
         events: The events.
         tasks: The tasks by name.
+        contacts: The contacts by name.
 
     Raises:
-        PydanticCustomError: There is no such task.
+        PydanticCustomError: There is no such task or contact, or it has no levels.
     """
+    known = {**tasks, **contacts}
     for k, event in enumerate(events):
+        what = "task or contact" if contacts else "task"
         for name in event.tasks:
-            if name not in tasks:
-                raise problem(f"{event.kind}: unknown task {shown(name)}" + listed(tasks, name), k)
+            if name not in known:
+                raise problem(
+                    f"{event.kind}: unknown {what} {shown(name)}" + listed(known, name), k
+                )
+            if name in contacts and (event.kind in ("move", "swap") or event.level is not None):
+                raise problem(f"{event.kind}: {shown(name)} is a contact and has no level", k)
+            if name in tasks and event.wait is not None:
+                raise problem(f"only contacts wait, and {shown(name)} is a task", k)
+        if event.when is not None and event.when.contact not in contacts:
+            name = event.when.contact
+            raise problem(f"when: unknown contact {shown(name)}" + listed(contacts, name), k)
 
 
 def in_order(events: Sequence[Event]) -> list[tuple[int, Event]]:
@@ -108,13 +171,28 @@ def in_order(events: Sequence[Event]) -> list[tuple[int, Event]]:
     return sorted(enumerate(events), key=lambda found: found[1].at)
 
 
-def late_tasks(events: Sequence[Event], tasks: Mapping[str, AnyTask]) -> frozenset[str]:
-    """Find the tasks that are not in the stack at the start: they say so, or an event inserts them."""
+def depending(events: Sequence[Event]) -> frozenset[str]:
+    """Find the tasks and contacts whose events no stack can be told of before the run.
+
+    Whether they are there when another event comes depends on what is felt.
+    """
+    return frozenset(name for e in events if e.when is not None for name in e.tasks)
+
+
+def late_tasks(
+    events: Sequence[Event], tasks: Mapping[str, AnyTask] | Mapping[str, AnyContact]
+) -> frozenset[str]:
+    """Find what is not in the stack at the start: it says so, or an event inserts it.
+
+    Args:
+        events: The events.
+        tasks: Tasks, or contacts, by name.
+    """
     first: dict[str, Event] = {}
     for _, event in in_order(events):
         for name in event.tasks:
             first.setdefault(name, event)
-    inserted = {name for name, event in first.items() if event.kind == "insert"}
+    inserted = {n for n, event in first.items() if event.kind == "insert" and n in tasks}
     return frozenset(inserted | {name for name, entry in tasks.items() if not entry.present})
 
 
@@ -124,6 +202,8 @@ def levels_visited(events: Sequence[Event], tasks: Mapping[str, AnyTask]) -> dic
     level = {name: float(entry.level) for name, entry in tasks.items()}
     visits = [(number, name) for name, number in level.items() if name not in late]
     for _, event in in_order(events):
+        if not set(event.tasks) <= set(tasks):
+            continue
         if event.kind == "swap":
             a, b = event.tasks
             level[a], level[b] = level[b], level[a]

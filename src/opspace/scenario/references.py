@@ -160,6 +160,18 @@ def _via_points(target: targets.ViaPointsEntry, space: Values) -> Reference:
     return ViaPoints(times, [space.start, *points], start_time=0.0)
 
 
+def _stops(target: targets.StopsEntry, space: Values) -> Reference:
+    here, legs = space.start, list[tuple[float, Reference]]()
+    for i, move in enumerate(target.moves):
+        there = (
+            space.shift(space.start, move.offset) if move.goal is None else space.read(move.goal)
+        )
+        begins = move.at if i else 0.0
+        legs.append((begins, space.move(here, there, move.duration, move.at)))
+        here = there
+    return Chain(*legs, start_time=0.0)
+
+
 def _swing(target: targets.SwingEntry, space: Values) -> Reference:
     center, axis = np.asarray(target.center), np.asarray(target.axis)
 
@@ -190,6 +202,7 @@ _BUILDERS: Mapping[type, Callable[[Any, Values], Reference | None]] = {
     targets.JerkLimitedEntry: _jerk_limited,
     targets.OutAndBackEntry: _out_and_back,
     targets.SwingEntry: _swing,
+    targets.StopsEntry: _stops,
     targets.ViaPointsEntry: _via_points,
     targets.CircleEntry: _circle,
 }

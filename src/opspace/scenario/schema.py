@@ -9,9 +9,10 @@ from pydantic import Field, PrivateAttr, ValidationInfo, field_validator, model_
 
 from opspace.errors import ScenarioError
 from opspace.law.scalars import LIMIT_LAWS
+from opspace.scenario.contact_entries import AnyContact, GroundEntry
 from opspace.scenario.document import Document, Key, key_text
 from opspace.scenario.events import Event, ProfileName, check_events
-from opspace.scenario.fields import Checked, Entry, Number, problem, shown, whole
+from opspace.scenario.fields import Checked, Entry, Number, listed, problem, shown, whole
 from opspace.scenario.obstacle_entries import CollisionsEntry
 from opspace.scenario.surface_entries import SurfaceEntry
 from opspace.scenario.targets import Configuration
@@ -98,12 +99,15 @@ class JointLimitsEntry(Entry):
 
 
 class PushEntry(Entry):
-    """A force on the tool for some time."""
+    """A force on the robot for some time."""
 
     at: Annotated[float, Number("s", at_least=0.0)] = Field(description="when it begins [s]")
     duration: Annotated[float, Number("s", above=0.0)] = Field(description="how long it lasts [s]")
     force: Annotated[tuple[float, ...], Number("N", size=3)] = Field(
         description="force in world axes [N]"
+    )
+    frame: str | None = Field(
+        default=None, description="name of the frame that is pushed; null is the tool"
     )
 
 
@@ -128,7 +132,7 @@ class PlantEntry(Entry):
         default=0.0, description="standard deviation of measured joint velocities [rad/s or m/s]"
     )
     pushes: list[PushEntry] = Field(
-        default_factory=list, description="forces on the tool, with times"
+        default_factory=list, description="forces on the robot, with times"
     )
     surfaces: list[SurfaceEntry] = Field(
         default_factory=list, description="what the tool may press; the wrench there is measured"
@@ -142,6 +146,17 @@ class PlantEntry(Entry):
     )
     torque_limits: bool = Field(
         default=True, description="saturate the torque at the robot's limits"
+    )
+
+
+class FallingEntry(Entry):
+    """When a robot on contacts is given up: from then on its joints are only damped."""
+
+    after: Annotated[float, Number("s", above=0.0)] = Field(
+        default=0.2, description="how long it may be not balanced [s]"
+    )
+    tilt: Annotated[float, Number("rad", above=0.0)] = Field(
+        default=0.8, description="how far its base may turn from where it was upright [rad]"
     )
 
 
@@ -218,6 +233,19 @@ class Scenario(Entry):
         description="compensate gravity and Coriolis in every joint or in the tasks only",
     )
     tasks: dict[str, AnyTask] = Field(description="name: what the robot is asked for")
+    contacts: dict[str, AnyContact] = Field(
+        default_factory=dict,
+        description="name: what a robot with a floating base stands on and holds on to; one that "
+        "starts in a named configuration is set down on those that are present",
+    )
+    ground: GroundEntry | None = Field(
+        default_factory=GroundEntry,
+        description="what contacts really touch; null is nothing",
+    )
+    falling: FallingEntry | None = Field(
+        default_factory=FallingEntry,
+        description="when a robot on contacts is given up and only damped; null is never",
+    )
     events: list[Event] = Field(
         default_factory=list, description="changes of the stack while the robot moves, with times"
     )
@@ -228,7 +256,9 @@ class Scenario(Entry):
         default=None, description="what the robot must not touch; null is nothing"
     )
     singularity: SingularityEntry | None = Field(
-        default_factory=SingularityEntry, description="singularity avoidance; null is none"
+        default_factory=SingularityEntry,
+        description="singularity avoidance; null is none, which a robot on contacts has where "
+        "nothing is said",
     )
     plant: PlantEntry = Field(default_factory=PlantEntry, description="the simulated robot")
     stop: StopEntry = Field(default_factory=StopEntry, description="when a run is given up")
@@ -240,15 +270,43 @@ class Scenario(Entry):
             raise problem("must be the name of a robot or the path of a robot file")
         return robot
 
+    @model_validator(mode="before")
+    @classmethod
+    def _no_buffer_on_contacts(cls, data: Any) -> Any:
+        # What is usual in flight says nothing about a robot that stands.
+        if isinstance(data, dict) and data.get("contacts"):
+            return {"singularity": None, **data}
+        return data
+
     @field_validator("tasks")
     @classmethod
     def _check_names(cls, tasks: dict[str, AnyTask]) -> dict[str, AnyTask]:
         if not tasks:
             raise problem("must have at least one task")
         for name in tasks:
-            if not name.strip() or "/" in name or name != name.strip():
+            if not _usable(name):
                 raise problem("a task's name must be text without a slash", name)
         return tasks
+
+    @field_validator("contacts")
+    @classmethod
+    def _check_contacts(
+        cls, contacts: dict[str, AnyContact], info: ValidationInfo
+    ) -> dict[str, AnyContact]:
+        for name in contacts:
+            if not _usable(name):
+                raise problem("a contact's name must be text without a slash", name)
+            if name in info.data.get("tasks", {}):
+                raise problem("is the name of a task already", name)
+        return contacts
+
+    @model_validator(mode="after")
+    def _check_boards(self) -> Self:
+        for i, board in enumerate(self.ground.boards if self.ground else ()):
+            if board.contact not in self.contacts:
+                message = f"boards[{i}]: unknown contact {shown(board.contact)}"
+                raise problem(message + listed(self.contacts, board.contact), "ground")
+        return self
 
     @model_validator(mode="after")
     def _check_tick(self) -> Self:
@@ -259,8 +317,8 @@ class Scenario(Entry):
     @field_validator("events")
     @classmethod
     def _check_events(cls, events: list[Event], info: ValidationInfo) -> list[Event]:
-        if "tasks" in info.data:
-            check_events(events, info.data["tasks"])
+        if "tasks" in info.data and "contacts" in info.data:
+            check_events(events, info.data["tasks"], info.data["contacts"])
         return events
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -286,6 +344,10 @@ class Scenario(Entry):
         if document is None:
             return ScenarioError(message, key=key_text(key))
         return document.error(key, message)
+
+
+def _usable(name: str) -> bool:
+    return bool(name.strip()) and "/" not in name and name == name.strip()
 
 
 def _again(data: dict[str, Any], origin: Origin) -> Scenario:

@@ -67,6 +67,10 @@ Configuration = Annotated[str | tuple[float, ...], Checked(_check_configuration)
 """Joint values, or the name of a configuration of the robot."""
 
 
+ROUNDING = 1e-9
+"""By how much a sum of two times may be off, s."""
+
+
 class HoldEntry(Entry):
     """Stay where the task finds the robot."""
 
@@ -173,6 +177,40 @@ class ViaPointsEntry(Entry, Generic[GoalT, OffsetT]):
         return self
 
 
+class MoveEntry(Entry, Generic[GoalT, OffsetT]):
+    """One way of several, from rest to rest."""
+
+    at: Seconds = Field(description="time at which it begins [s]")
+    duration: Duration = Field(description="time that it takes [s]")
+    goal: GoalT | None = Field(default=None, description="where it leads, written as a value")
+    offset: OffsetT | None = Field(
+        default=None, description="where it leads, relative to the start of the run"
+    )
+
+    @model_validator(mode="after")
+    def _one_aim(self) -> Self:
+        if (self.goal is None) == (self.offset is None):
+            raise problem("needs either the key 'goal' or the key 'offset'")
+        return self
+
+
+class StopsEntry(Entry, Generic[GoalT, OffsetT]):
+    """From stop to stop, each way straight with the least jerk, and still between them."""
+
+    type: Literal["stops"] = Field(description="stops")
+    moves: Annotated[list[MoveEntry[GoalT, OffsetT]], Field(min_length=1)] = Field(
+        description="the ways in order of time; none begins before the one before it is over"
+    )
+
+    @model_validator(mode="after")
+    def _in_turn(self) -> Self:
+        for i, (one, following) in enumerate(pairwise(self.moves), start=1):
+            end = one.at + one.duration
+            if following.at < end - ROUNDING:
+                raise problem(f"moves[{i}]: must not begin before {end:g} s", "moves")
+        return self
+
+
 class CircleEntry(Entry):
     """On a circle that passes through the start, from rest up to one turn per period."""
 
@@ -213,6 +251,7 @@ PointTarget = Annotated[
     | Annotated[JerkLimitedEntry[Point, Point], Tag("<jerk_limited>")]
     | Annotated[OutAndBackEntry[Point], Tag("<out_and_back>")]
     | Annotated[ViaPointsEntry[Point, Point], Tag("<via_points>")]
+    | Annotated[StopsEntry[Point, Point], Tag("<stops>")]
     | Annotated[CircleEntry, Tag("<circle>")]
     | Annotated[SwingEntry, Tag("<swing>")],
     _BY_TYPE,
@@ -222,7 +261,8 @@ OrientationTarget = Annotated[
     Annotated[Quaternion, Tag("<value>")]
     | Annotated[HoldEntry, Tag("<hold>")]
     | Annotated[MinimumJerkEntry[Quaternion, RotationVector], Tag("<minimum_jerk>")]
-    | Annotated[OutAndBackEntry[RotationVector], Tag("<out_and_back>")],
+    | Annotated[OutAndBackEntry[RotationVector], Tag("<out_and_back>")]
+    | Annotated[StopsEntry[Quaternion, RotationVector], Tag("<stops>")],
     _BY_TYPE,
 ]
 
@@ -232,6 +272,7 @@ PostureTarget = Annotated[
     | Annotated[MinimumJerkEntry[Configuration, Joints], Tag("<minimum_jerk>")]
     | Annotated[JerkLimitedEntry[Configuration, Joints], Tag("<jerk_limited>")]
     | Annotated[OutAndBackEntry[Joints], Tag("<out_and_back>")]
+    | Annotated[StopsEntry[Configuration, Joints], Tag("<stops>")]
     | Annotated[ViaPointsEntry[Configuration, Joints], Tag("<via_points>")],
     _BY_TYPE,
 ]
@@ -242,6 +283,7 @@ JointTarget = Annotated[
     | Annotated[MinimumJerkEntry[Joint, Joint], Tag("<minimum_jerk>")]
     | Annotated[JerkLimitedEntry[Joint, Joint], Tag("<jerk_limited>")]
     | Annotated[OutAndBackEntry[Joint], Tag("<out_and_back>")]
+    | Annotated[StopsEntry[Joint, Joint], Tag("<stops>")]
     | Annotated[ViaPointsEntry[Joint, Joint], Tag("<via_points>")],
     _BY_TYPE,
 ]

@@ -56,8 +56,8 @@ _GIVE_WAY = "name of the force task along whose force the target follows the too
 _TARGET = "value or reference to follow; null holds the value at the start"
 
 
-class TaskEntry(Entry):
-    """What every task has."""
+class PlacedEntry(Entry):
+    """What every task has, whatever it asks for."""
 
     level: Annotated[int, Checked(whole)] = Field(description="priority, 0 is the highest")
     present: bool = Field(
@@ -69,6 +69,12 @@ class TaskEntry(Entry):
     )
     if TYPE_CHECKING:  # every kind has its own
         type: str
+
+
+class TaskEntry(PlacedEntry):
+    """What every task has that is led to a target or presses."""
+
+    if TYPE_CHECKING:  # every kind has its own
         target: Any
 
 
@@ -157,6 +163,10 @@ _TRACKED: Mapping[str, Mapping[str, _Argument]] = {
         ("joint", JointTarget, JointSpeed, JointAcceleration, f"{_SPEED} [rad/s or m/s]"),
         ("joints", PostureTarget, JointSpeed, JointAcceleration, f"norm of the {_SPEED} [rad/s]"),
     )
+} | {
+    "momentum": {
+        "kv": _Argument(Annotated[float, Number("1/s", at_least=0.0)], "rate of decay [1/s]")
+    }
 }
 _CONTROLLED: Mapping[str, Mapping[str, _Argument]] = {
     **_TRACKED,
@@ -205,7 +215,7 @@ _IMPEDANCE: Mapping[str, _Argument] = {
 _PLAIN: Mapping[Any, Any] = {float: Annotated[float, Number("1")], bool: bool, str: str}
 
 
-def make_entry(name: str, kind: TaskKind) -> type[TaskEntry]:
+def make_entry(name: str, kind: TaskKind) -> type[PlacedEntry]:
     """Make the entry of a kind of task.
 
     Args:
@@ -219,12 +229,17 @@ def make_entry(name: str, kind: TaskKind) -> type[TaskEntry]:
     known = {**_ARGUMENTS, **_CONTROLLED[kind.controls]}
     if name == "impedance":
         known |= _IMPEDANCE
-    base = TaskEntry if kind.sprung else GainsEntry
+    base = GainsEntry
+    if kind.controls == "momentum":
+        base = PlacedEntry
+    elif kind.sprung:
+        base = TaskEntry
+    always = ("self", "name", *base.model_fields)
     fields: dict[str, Any] = {"type": (Literal[name], Field(description=name))}
     if name in GIVING_WAY:
         fields["give_way"] = str | None, Field(default=None, description=_GIVE_WAY)
     for key, argument in inspect.signature(kind.task).parameters.items():
-        if key in ("self", "name") or key in base.model_fields:
+        if key in always:
             continue
         takes, means = known.get(key) or _by_type(kind, key)
         default = argument.default
@@ -247,13 +262,13 @@ def _by_type(kind: TaskKind, key: str) -> _Argument:
     return _Argument(_nullable(takes) if type(None) in choices else takes, means)
 
 
-ENTRIES: Mapping[str, type[TaskEntry]] = MappingProxyType(
+ENTRIES: Mapping[str, type[PlacedEntry]] = MappingProxyType(
     {name: make_entry(name, kind) for name, kind in TASK_KINDS.items()}
 )
 """The entry of every kind of task, by what a scenario calls it."""
 
 if TYPE_CHECKING:
-    AnyTask = TaskEntry
+    AnyTask = PlacedEntry
 else:
     AnyTask = Annotated[
         Union[tuple(Annotated[entry, Tag(f"<{name}>")] for name, entry in ENTRIES.items())],  # noqa: UP007

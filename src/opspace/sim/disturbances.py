@@ -21,17 +21,19 @@ STIFF = 0.9999
 
 @dataclass(frozen=True)
 class Push:
-    """A constant force on the tool for some time.
+    """A constant force for some time.
 
     Attributes:
         at: When it begins, s.
         duration: How long it lasts, s.
         force: (3,) N, in world axes.
+        frame: Name of the frame that is pushed; None is the tool.
     """
 
     at: float
     duration: float
     force: Sequence[float]
+    frame: str | None = None
 
     def __post_init__(self) -> None:
         force = np.asarray(self.force, dtype=float)
@@ -202,22 +204,29 @@ class Wire:
 
 
 class Hand:
-    """Pushes the tool.
+    """Pushes the robot.
 
     Args:
         robot: The robot that is pushed; it is left alone.
-        pushes: When, how long and how hard.
+        pushes: When, where, how long and how hard.
+
+    Raises:
+        UnknownNameError: The robot has no frame of this name.
     """
 
     def __init__(self, robot: Robot, pushes: Sequence[Push]) -> None:
-        self._pushes = tuple(pushes)
+        self._pushes = tuple((push, robot.frame_id(push.frame or robot.tool)) for push in pushes)
         self._robot = robot.fresh() if self._pushes else robot
-        self._tool = robot.frame_id(robot.tool)
 
     def torque(self, t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray | None:
         """Return Jᵀ F of the pushes that last at time t, (n,) N·m; None where there is none."""
-        forces = [p.force for p in self._pushes if p.at <= t < p.at + p.duration]
-        if not forces:
+        now = [(p.force, id_) for p, id_ in self._pushes if p.at <= t < p.at + p.duration]
+        if not now:
             return None
         self._robot.update(q, v)
-        return self._robot.jacobian(self._tool)[:3].T @ np.sum(forces, axis=0)
+        frames = dict.fromkeys(id_ for _, id_ in now)
+        total = np.zeros(v.size)
+        for frame in frames:
+            force = np.sum([force for force, id_ in now if id_ == frame], axis=0)
+            total += self._robot.jacobian(frame)[:3].T @ force
+        return total

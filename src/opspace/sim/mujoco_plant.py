@@ -127,6 +127,7 @@ class Plant:
                     f"the start velocity of {robot.name!r} must be {robot.nv} finite numbers"
                 )
             self.data.qvel[:] = speed if spread is None else spread.G @ speed
+        self._lay_boards()
         mujoco.mj_forward(self.model, self.data)
         self.dt = dt
 
@@ -174,6 +175,7 @@ class Plant:
         Args:
             tau: (n,) N·m.
         """
+        self._lay_boards()
         asked = self._wire.send(tau)
         if self._own_model is not None:
             self._own_model.update(self.q, self.v)
@@ -216,6 +218,10 @@ class Plant:
     def contact_forces(self) -> dict[str, np.ndarray]:
         """What presses on each contact of the ground, (3,) N on the robot in world axes, by name."""
         return {} if self._ground is None else self._ground.forces(self.model, self.data)
+
+    def _lay_boards(self) -> None:
+        if self._ground is not None and self._ground.boards:
+            self._ground.lay_boards(self.model, self.t)
 
     def _own(self, values: np.ndarray) -> np.ndarray:
         """Leave the joints that lead; those that follow belong to the simulation."""

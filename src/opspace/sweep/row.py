@@ -35,7 +35,8 @@ def run_row(plan: SweepPlan, index: int) -> dict[str, Any]:
         row["id"], row["scenario"] = run_id(scenario), to_dict(scenario)
         built = build(scenario)
         watch = LimitWatch(built)
-        outcome = simulate(built.plant, built.controller, scenario.duration, [watch], built.stop)
+        observers = [watch, built.triggers]
+        outcome = simulate(built.plant, built.controller, scenario.duration, observers, built.stop)
     except OpspaceError as error:
         return {**row, "ended": "refused", "reason": str(error)}
     except Exception as error:

@@ -52,6 +52,7 @@ TASK_KINDS = MappingProxyType(
         "posture": TaskKind(PostureTask, "joints"),
         "joint": TaskKind(JointTask, "joint"),
         "com": TaskKind(ComTask, "position"),
+        "angular_momentum": TaskKind(AngularMomentumTask, "momentum"),
         "relative_position": TaskKind(RelativePositionTask, "position"),
         "relative_orientation": TaskKind(RelativeOrientationTask, "orientation"),
         "relative_pose": TaskKind(RelativePoseTask, "pose"),

@@ -13,10 +13,10 @@ class TaskKind(NamedTuple):
     Attributes:
         task: Its class.
         controls: What a target is a value of; it says which targets a scenario can give, in which
-            unit speeds are, and how many rows there are. Forces have no target.
+            unit speeds are, and how many rows there are. Forces and momentum have no target.
         sprung: Whether it has gains of its own in place of kp and kv.
     """
 
     task: type[Task]
-    controls: Literal["position", "orientation", "pose", "joint", "joints", "force"]
+    controls: Literal["position", "orientation", "pose", "joint", "joints", "force", "momentum"]
     sprung: bool = False

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from html import escape
 from typing import Any
 
@@ -162,6 +162,32 @@ class StackControls:
     def _stiffness(self, name: str) -> float:
         kp = self._tasks[name]["kp"]
         return min(float(kp[0] if isinstance(kp, list) else kp), KP_MOST)
+
+
+class ContactControls:
+    """Buttons that insert and remove contacts.
+
+    Args:
+        server: The server of the page.
+        ask: Takes messages to the run.
+        contacts: Names of the contacts.
+    """
+
+    def __init__(self, server: viser.ViserServer, ask: Ask, contacts: Sequence[str]) -> None:
+        self._ask = ask
+        names = tuple(contacts)
+        self._contact = server.gui.add_dropdown("Contact", names, initial_value=names[0])
+        self._duration = server.gui.add_slider("Takes [s]", 0.0, 3.0, 0.05, 0.3)
+        self._waits = server.gui.add_checkbox("Waits until the others carry", True)
+        buttons = server.gui.add_button_group("Contact goes", ("Insert contact", "Remove contact"))
+        buttons.on_click(lambda event: self._change(event.target.value.split()[0].lower()))
+
+    def _change(self, kind: str) -> None:
+        request: dict[str, Any] = {"kind": kind, "tasks": [self._contact.value]}
+        request["duration"] = float(self._duration.value)
+        if kind == "remove":
+            request["wait"] = bool(self._waits.value)
+        self._ask({"request": request})
 
 
 def answer(what: str, reason: str) -> str:

@@ -9,8 +9,10 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from opspace.errors import InputError
+from opspace.record.contact_columns import GROUP as CONTACTS
 from opspace.record.growing import GrowingRecording
-from opspace.record.obstacle_columns import GROUP, HEADER_KEY, PARTS, placing_of
+from opspace.record.obstacle_columns import GROUP as OBSTACLES
+from opspace.record.obstacle_columns import HEADER_KEY, PARTS, placing_of
 from opspace.tasks.obstacles import Placing
 
 
@@ -54,6 +56,32 @@ class LevelFrame:
 
 
 @dataclass(frozen=True)
+class ContactFrame:
+    """A contact at one tick.
+
+    Attributes:
+        name: Its name.
+        progress: How far it has come, 0 to 1; nan while it is not in the stack.
+        activation: h of its force.
+        force: (3,) planned force on the robot in world axes, N.
+        measured: (3,) measured force, N; nan where none is.
+        cop: (2,) centre of pressure in its axes, m.
+        cone_use: Part of its cone that the force uses.
+    """
+
+    name: str
+    progress: float
+    activation: float
+    force: np.ndarray
+    measured: np.ndarray
+    cop: np.ndarray
+    cone_use: float
+
+
+_NOWHERE = np.full(3, np.nan)
+
+
+@dataclass(frozen=True)
 class Frame:
     """One tick.
 
@@ -67,6 +95,8 @@ class Frame:
         limits: Activation of the joint limits by name.
         status: Flags of the command.
         obstacles: Where obstacles are, by name, those that are there.
+        contacts: The contacts.
+        com: (3,) centre of mass, m; nan for robots that are bolted down.
     """
 
     t: float
@@ -78,6 +108,8 @@ class Frame:
     limits: dict[str, float]
     status: int
     obstacles: Mapping[str, Placing] = field(default_factory=dict[str, Placing])
+    contacts: tuple[ContactFrame, ...] = ()
+    com: np.ndarray = field(default_factory=lambda: _NOWHERE)
 
 
 class FrameReader:
@@ -103,12 +135,14 @@ class FrameReader:
         limits = recording.group("limits")
         self._limits = {name.removeprefix("limits/"): recording.index[name] for name in limits}
         self._obstacles = {
-            name: recording.columns([f"{GROUP}/{name}/{part}" for part in PARTS])
+            name: recording.columns([f"{OBSTACLES}/{name}/{part}" for part in PARTS])
             for name in recording.header.get(HEADER_KEY, {}).get("obstacles", {})
-            if recording.group(f"{GROUP}/{name}")
+            if recording.group(f"{OBSTACLES}/{name}")
         }
         self._tasks = {name: self._task(name) for name in recording.header["tasks"]}
         self._levels = {float(name): self._level(name) for name in _levels(recording)}
+        self._contacts = {name: self._contact(name) for name in recording.header.get(CONTACTS, {})}
+        self._com = recording.columns(recording.group("com"))
 
     @property
     def joints(self) -> list[str]:
@@ -146,6 +180,10 @@ class FrameReader:
                 for name, part in self._obstacles.items()
                 if not np.isnan(values[part[0]])
             },
+            contacts=tuple(
+                _contact_frame(name, values, places) for name, places in self._contacts.items()
+            ),
+            com=values[self._com] if self._com else _NOWHERE,
         )
 
     def row_at(self, t: float) -> int:
@@ -176,6 +214,19 @@ class FrameReader:
         h, level = recording.columns([f"tasks/{name}/activation", f"tasks/{name}/level"])
         return h, level, recording.columns(recording.group(f"tasks/{name}/error"))
 
+    def _contact(self, name: str) -> dict[str, list[int]]:
+        recording = self.recording
+        single = ("progress", "activation", "cone_use")
+        found = {part: recording.columns([f"{CONTACTS}/{name}/{part}"]) for part in single}
+        several = ("force", "measured", "cop")
+        found.update(
+            {
+                part: recording.columns(recording.group(f"{CONTACTS}/{name}/{part}"))
+                for part in several
+            }
+        )
+        return found
+
     def _level(self, number: str) -> tuple[list[int], list[int], list[int]]:
         recording, prefix = self.recording, f"levels/{number}"
         sigma, activation, weakest = (
@@ -183,6 +234,19 @@ class FrameReader:
             for part in ("sigma", "activation", "weakest")
         )
         return sigma, activation, weakest
+
+
+def _contact_frame(name: str, values: np.ndarray, places: dict[str, list[int]]) -> ContactFrame:
+    one = {part: values[columns] for part, columns in places.items()}
+    return ContactFrame(
+        name,
+        float(one["progress"][0]),
+        float(one["activation"][0]),
+        one["force"],
+        one["measured"] if one["measured"].size else _NOWHERE,
+        one["cop"],
+        float(one["cone_use"][0]),
+    )
 
 
 def _levels(recording: GrowingRecording) -> list[str]:

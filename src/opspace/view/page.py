@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from opspace.errors import InputError, ModelWarning, missing_extra
+from opspace.record.contact_columns import GROUP
 from opspace.record.growing import GrowingRecording
 from opspace.record.obstacle_columns import HEADER_KEY
 from opspace.robots import Robot, load_robot
@@ -25,7 +26,8 @@ except ImportError:
 from opspace.view import panels
 from opspace.view.charts import Chart, sigma_columns, torque_columns
 from opspace.view.collision_scene import CollisionScene
-from opspace.view.controls import Ask, RunControls, StackControls
+from opspace.view.contact_scene import ContactScene
+from opspace.view.controls import Ask, ContactControls, RunControls, StackControls
 from opspace.view.distance_panel import distances
 from opspace.view.frame import FrameReader
 from opspace.view.scene import RobotScene
@@ -80,6 +82,8 @@ class Page:
             self._about["tasks"],
             None if ask is None else self._drag,
         )
+        touching = self._about.get(GROUP, {})
+        self._contacts = ContactScene(self._server, robot, touching) if touching else None
         self._ask = ask
         self._charted = self._drawn = 0.0
         self._shown: tuple[int, bool] | None = None
@@ -147,8 +151,10 @@ class Page:
             self._apart.shapes_shown = self._shapes_shown.value
             gaps = self._apart.show(frame, live)
             self._distances.content = distances(gaps, self._apart.margin)
+        if self._contacts is not None:
+            self._contacts.show(frame)
         self._head.content = panels.head(frame, self._note(live))
-        self._bars.content = panels.tasks(frame)
+        self._bars.content = panels.contacts(frame) + panels.tasks(frame)
         if now - self._charted >= 1.0 / CHARTS or self._run.paused:
             self._charted = now
             self._joints.content = panels.joints(frame, self._reader.joints, self._about["robot"])
@@ -179,6 +185,9 @@ class Page:
                 gui.add_divider()
                 homes = _homes(self._about)
                 self._controls = StackControls(self._server, ask, self._about["tasks"], homes)
+            if ask is not None and self._about.get(GROUP):
+                gui.add_divider()
+                ContactControls(self._server, ask, list(self._about[GROUP]))
         with tabs.add_tab("Joints"):
             self._joints = gui.add_html("")
         if HEADER_KEY in self._about:

@@ -69,6 +69,33 @@ def tasks(frame: Frame) -> str:
     return _panel(rows)
 
 
+def contacts(frame: Frame) -> str:
+    """Draw every contact as a bar of its progress, with its normal force and the use of its cone."""
+    if not frame.contacts:
+        return ""
+    rows = [_title("contacts", "planned, measured, use of the cone")]
+    for contact in frame.contacts:
+        there = not math.isnan(contact.progress)
+        s = contact.progress if there else 0.0
+        name, ink = escape(contact.name), _INK if there else _FAINT
+        planned, measured = (
+            "–" if np.isnan(force).any() else f"{np.linalg.norm(force):.0f} N"
+            for force in (contact.force, contact.measured)
+        )
+        use = f"{contact.cone_use:.0%}" if there else "–"
+        rows.append(
+            f'<div style="{_ROW};color:{ink}" data-opspace-contact="{name}" data-opspace-s="{s:.3f}">'
+            f'<span style="{_NAME};flex-basis:24%" title="{name}">{name}</span>'
+            '<span style="flex:1;height:10px;border-radius:3px;background:rgba(140,140,140,0.22)">'
+            f'<span style="display:block;height:10px;border-radius:3px;'
+            f"background:{ACTIVE if s >= 1.0 else blend_color(0.5 + 0.5 * s)};"
+            f'width:{100.0 * s:.1f}%"></span></span>'
+            + "".join(f'<span style="{_NUMBER}">{one}</span>' for one in (planned, measured, use))
+            + "</div>"
+        )
+    return _panel(rows)
+
+
 def joints(frame: Frame, names: Sequence[str], robot: Mapping[str, Any]) -> str:
     """Draw every joint in its range with the zones where its limits act, and its torque.
 

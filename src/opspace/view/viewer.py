@@ -10,10 +10,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from opspace.command import Command
+from opspace.contacts import GroundContact
 from opspace.controller import ReferenceController
 from opspace.errors import InputError, OpspaceError
 from opspace.loop.pacing import Pacing
 from opspace.loop.requests import FILE, Changes, RequestDesk, RunRequest
+from opspace.record.contact_columns import Felt
 from opspace.record.format import Ended
 from opspace.record.observer import State, TickRecorder
 from opspace.tasks import Task
@@ -44,6 +46,8 @@ class Viewer:
         tasks: Tasks that are not in the stack yet, for the page to insert.
         levels: Tasks that may be at each level, see `opspace.TickRecorder`.
         truth: See `opspace.TickRecorder`.
+        contacts: Contacts that are not in the stack yet, for the page to insert.
+        felt: See `opspace.TickRecorder`.
         overwrite: Replace a recording that is already there.
         speed: Seconds of the run per second of the clock; None holds nothing back, for a loop that
             has a clock of its own. Then the page cannot pause either.
@@ -68,6 +72,8 @@ class Viewer:
         tasks: Sequence[Task] = (),
         levels: Mapping[float, Sequence[Task]] | None = None,
         truth: State | None = None,
+        contacts: Sequence[GroundContact] = (),
+        felt: Felt | None = None,
         overwrite: bool = False,
         speed: float | None = 1.0,
         host: str = HOST,
@@ -85,9 +91,13 @@ class Viewer:
             tasks=tasks,
             levels=levels,
             truth=truth,
+            contacts=contacts,
+            felt=felt,
             overwrite=overwrite,
         )
-        self._desk = RequestDesk(Changes(controller, tasks), directory / FILE, self._answer)
+        self._desk = RequestDesk(
+            Changes(controller, tasks, contacts), directory / FILE, self._answer
+        )
         self._page = PageProcess(directory, host, port, self._hear, self._go_on)
         try:
             self._page.wait()

@@ -1,0 +1,104 @@
+"""When a robot that stands is given up, and what its joints do then."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from opspace.command import Command, Status
+from opspace.errors import InputError
+from opspace.law import Profile
+from opspace.robots.protocol import Robot
+from opspace.tasks.rotation import matrix_from_quaternion
+
+SLACKENING = 0.05
+"""Time in which the torque of the last tick that stood goes away, s."""
+
+
+@dataclass(frozen=True)
+class FallRule:
+    """When a robot on contacts counts as falling.
+
+    It falls when ``Status.NOT_BALANCED`` has held without a break for ``after``, or when the base
+    has turned away from upright, which is how it stands in the robot's reference posture, by more than
+    ``tilt``. From then on no task is followed: the joints are damped until `opspace.Controller.restart`.
+
+    Attributes:
+        after: How long the robot may be not balanced, s. A push is over sooner; a flight that is
+            wanted is not.
+        tilt: How far the vertical may be from where it is in the base when it stands, rad.
+
+    Raises:
+        InputError: A number that is not above 0.
+    """
+
+    after: float = 0.2
+    tilt: float = 0.8
+
+    def __post_init__(self) -> None:
+        for what in ("after", "tilt"):
+            value = getattr(self, what)
+            if not (math.isfinite(value) and value > 0.0):
+                raise InputError(f"falling: {what} must be above 0, got {value}")
+
+
+class FallWatch:
+    """Gives a robot up by a rule, and damps it.
+
+    With Γ₀ the last torque of the robot that stood, s the quintic profile over `SLACKENING` and d the
+    controller's damping,
+
+        Γ(t) = (1 − s(t)) Γ₀ − d diag(M) v
+
+    within the motors' limits: no step when it begins, nothing that pulls when it has.
+
+    Args:
+        rule: The rule.
+        robot: The robot.
+        damping: d, 1/s.
+    """
+
+    def __init__(self, rule: FallRule, robot: Robot, damping: float) -> None:
+        self._rule, self._robot, self._damping = rule, robot, damping
+        self._upright = _vertical(robot.q_reference)
+        self._profile = Profile("quintic")
+        self.forget()
+
+    def forget(self) -> None:
+        """Let the robot stand again."""
+        self._unbalanced: float | None = None
+        self._fell: float | None = None
+        self._last = np.zeros(self._robot.nv)
+
+    def after(self, command: Command) -> Command:
+        """Look at a tick, and answer in its place once the robot falls."""
+        if self._fell is None:
+            if not self._falls(command):
+                self._last = command.tau
+                return command
+            self._fell = command.t
+        tau = self._damped(command.t - self._fell)
+        return command._replace(tau=tau, status=command.status | Status.FALLING)
+
+    def _falls(self, command: Command) -> bool:
+        if Status.NOT_BALANCED not in command.status:
+            self._unbalanced = None
+        elif self._unbalanced is None:
+            self._unbalanced = command.t
+        lost = self._unbalanced is not None and command.t - self._unbalanced >= self._rule.after
+        turned = float(_vertical(self._robot.q) @ self._upright)
+        return lost or turned < math.cos(min(self._rule.tilt, math.pi))
+
+    def _damped(self, since: float) -> np.ndarray:
+        robot = self._robot
+        limit = np.where(robot.actuated, robot.torque_limit, 0.0)
+        left = 1.0 - self._profile(min(max(since, 0.0) / SLACKENING, 1.0)).value
+        tau = left * self._last - self._damping * robot.M.diagonal() * robot.v
+        return np.clip(np.nan_to_num(tau, nan=0.0), -limit, limit)
+
+
+def _vertical(q: np.ndarray) -> np.ndarray:
+    """Give the vertical in the axes of the base, (3,)."""
+    return matrix_from_quaternion(tuple(np.asarray(q, dtype=float)[3:7].tolist()))[2]

@@ -1,0 +1,187 @@
+"""Robots that stand, as shipped and spoiled: the torque moves in small steps, and nobody falls."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from opspace.command import Status
+from opspace.compare.humanoid import CHANGES, VARIANTS, measures, reproduce_humanoid, table
+from opspace.loop import simulate
+from opspace.record import load
+from opspace.runs.metrics import largest_torque_step
+from opspace.runs.run import run_scenario
+from opspace.scenario import load_scenario, scenario_from
+from opspace.scenario.build import build
+
+LANDS = ("foot lands", "hand presses")
+ON_ONE_LEG = "duration=6.9"
+"""Of the humanoid, until it has landed."""
+
+TALOS = {
+    "robot": "talos",
+    "duration": 5.2,
+    "torque_limits": "priority",
+    "contacts": {
+        side: {"type": "sole", "frame": f"{side}_sole_link", "half": [0.1, 0.06]}
+        for side in ("left", "right")
+    },
+    "tasks": {
+        "com": {
+            "type": "com",
+            "level": 0,
+            "target": {
+                "type": "minimum_jerk",
+                "offset": [-0.017, 0.08, 0.0],
+                "start_time": 0.2,
+                "duration": 1.8,
+            },
+        },
+        "torso": {"type": "orientation", "level": 1, "frame": "torso_2_link"},
+        "foot": {
+            "type": "pose",
+            "level": 2,
+            "frame": "right_sole_link",
+            "present": False,
+            "target": {
+                "position": {
+                    "type": "stops",
+                    "moves": [
+                        {"at": 2.7, "duration": 0.7, "offset": [0.03, 0.0, 0.04]},
+                        {"at": 3.4, "duration": 0.7, "offset": [0.03, 0.0, 0.01]},
+                        {"at": 4.1, "duration": 1.6, "offset": [0.03, 0.0, -0.02]},
+                    ],
+                }
+            },
+        },
+        "posture": {"type": "posture", "level": 3, "kp": 25.0},
+    },
+    "events": [
+        {"at": 2.1, "insert": "foot", "level": 0.5, "duration": 0.0},
+        {"at": 2.1, "remove": "right", "duration": 0.3},
+        {
+            "at": 3.5,
+            "when": {"contact": "right", "force_above": 18.0},
+            "insert": "right",
+            "duration": 0.3,
+        },
+        {
+            "at": 3.5,
+            "when": {"contact": "right", "force_above": 18.0},
+            "remove": "foot",
+            "duration": 0.3,
+        },
+    ],
+    "plant": {"friction": True},
+}
+
+
+def run(tmp_path, name, *overrides):
+    scenario = load_scenario(name, overrides)
+    result = run_scenario(scenario, tmp_path / "run")
+    assert result.outcome.completed
+    return scenario, result.recording
+
+
+@pytest.mark.slow
+def test_the_humanoid_as_shipped_beside_a_hard_switch(tmp_path):
+    variants = {name: VARIANTS[name] for name in ("transition", "switch")}
+    runs = reproduce_humanoid(tmp_path, variants)
+    scenario = load_scenario("humanoid")
+    ours, hard = (measures(runs[name].recording, scenario) for name in variants)
+    print(table({"ours": ours, "hard": hard}))
+    for change in CHANGES:
+        assert ours[change] <= (0.5 if change in LANDS else 0.15), change
+    assert hard["anywhere"] >= 20.0 * ours["anywhere"]
+    assert ours["force of the foot that lets go"] <= 1.0
+    assert ours["centre of mass, largest error"] <= 2.0
+    assert ours["force, measured less planned, rms"] <= 0.5
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("override", "most"),
+    [
+        ("plant.delay=0.002", 0.5),
+        ("plant.mass_error=0.1", 0.5),
+        ("ground.boards=[{contact: right, height: 0.01, at: 3.5}]", 1.5),
+        ("ground.boards=[{contact: right, height: -0.01, at: 3.5}]", 1.5),
+    ],
+)
+def test_a_humanoid_that_is_not_what_its_model_says(tmp_path, override, most):
+    scenario, recording = run(tmp_path, "humanoid", ON_ONE_LEG, override)
+    found = measures(recording, scenario)
+    print(override, found)
+    assert found["foot lands"] is not None
+    assert found["anywhere"] <= most
+    assert found["centre of mass, largest error"] <= 4.0
+
+
+@pytest.mark.slow
+def test_talos_lifts_a_foot_and_lands_with_friction_that_nobody_knows_of(tmp_path):
+    result = run_scenario(scenario_from(TALOS), tmp_path / "talos")
+    recording = result.recording
+    assert result.outcome.completed
+    assert np.nanmin(recording["contacts/left/force/z"]) >= 0.0
+    assert np.isnan(recording["contacts/right/progress"]).any()
+    assert recording["contacts/right/progress"][-1] == 1.0
+    step = largest_torque_step(recording, 0.01, 10.0)
+    print(step, np.nanmax(np.linalg.norm(recording.group("tasks/com/error"), axis=1)))
+    assert step <= 2.0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "most", "millimetres"),
+    [("humanoid-wall", 0.5, 2.0), ("quadruped-trot", 0.5, 2.0), ("humanoid-push", 1.5, 15.0)],
+)
+def test_the_others_as_shipped(tmp_path, name, most, millimetres):
+    _, recording = run(tmp_path, name)
+    error = 1e3 * np.nanmax(np.linalg.norm(recording.group("tasks/com/error"), axis=1))
+    print(name, largest_torque_step(recording, 0.005, 10.0), error)
+    assert largest_torque_step(recording, 0.005, 10.0) <= most
+    assert error <= millimetres
+    assert not (recording["status"].astype(int) & int(Status.FALLING)).any()
+
+
+@pytest.mark.slow
+def test_a_lost_foot_is_noticed_and_let_go():
+    """The floor falls away below one foot while the centre of mass is over the other."""
+    data = load_scenario("humanoid").model_dump(mode="json")
+    lost = {
+        "at": 0.5,
+        "when": {"contact": "right", "force_below": 2.0, "lasting": 0.01},
+        "remove": "right",
+        "duration": 0.05,
+        "wait": False,
+    }
+    hole = [{"contact": "right", "height": -0.2, "at": 1.9}]
+    data.update(duration=3.0, events=[lost], ground={**data["ground"], "boards": hole})
+    built = build(scenario_from(data))
+    seen = []
+
+    class Watch:
+        def observe(self, q, v, command):
+            seen.append((command.t, command.tau, set(command.contacts), command.status, q[2]))
+
+    outcome = simulate(built.plant, built.controller, 3.0, [built.triggers, Watch()], built.stop)
+    assert outcome.completed
+    steps = [np.max(np.abs(b[1] - a[1])) for a, b in pairwise(seen[2:])]
+    print("lost foot", max(steps))
+    assert seen[-1][2] == {"left"}
+    assert seen[-1][4] > 0.7
+    assert not any(Status.FALLING in one[3] for one in seen)
+    assert max(steps) <= 2.0
+
+
+def test_a_table_has_a_row_for_everything_that_is_measured(tmp_path):
+    """Cheap: the first moments, in which nothing has happened yet."""
+    scenario = load_scenario("humanoid", ["duration=0.01"])
+    runs = reproduce_humanoid(tmp_path, {"weighted": VARIANTS["weighted"]}, scenario=scenario)
+    found = measures(load(tmp_path / "weighted"), scenario)
+    heads, rows = table({"weighted": found})
+    assert [row[0] for row in rows] == list(found)
+    assert len(heads) == len(rows[0])
+    assert runs["weighted"].outcome.completed
+    assert all(found[change] is None for change in CHANGES)
+    assert found["anywhere"] > 0.0
