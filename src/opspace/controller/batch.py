@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
@@ -60,7 +60,7 @@ class Batch:
         self.members = members
         self.threads = threads
         self.robot = robot
-        self._plans = [planned(members, _axes(model)) for _ in range(threads)]
+        self._plans = [planned(members, axes_of(model)) for _ in range(threads)]
 
     @property
     def plan(self) -> Plan:
@@ -92,7 +92,7 @@ class Batch:
         known = () if before is None else before.variables
         ramps = tuple(variable.ramp for variable in first.variables)
         first.go_on(first.heritage(before, known, first.variables, ramps), first.members)
-        self._refresh(t)
+        refresh_apart(self._plans, self.robot, t)
         given = {"Q": Q, "V": V, "own": own, "before": _remembered(first)}
         states = STATES.make({}, given)
         ticks, record = KERNELS["ticks"], states.handle()
@@ -119,15 +119,6 @@ class Batch:
             row[:] = np.nan_to_num(robot.gravity, nan=0.0, posinf=0.0, neginf=0.0)
         return found
 
-    def _refresh(self, t: float) -> None:
-        """Bring all plans up to date, without beginning for the tasks what they have not begun."""
-        tasks = [m.task for m in self.members if isinstance(m.task, TrackingTask)]
-        progress = [task.progress for task in tasks]
-        for plan in self._plans:
-            plan.refresh(self.robot, t)
-        for task, before in zip(tasks, progress, strict=True):
-            task.recall(before)
-
     def _own_activations(self, Q: np.ndarray, V: np.ndarray, t: float) -> np.ndarray:
         """Evaluate the activations that users gave to tasks, in Python, state by state."""
         own = np.ones((1, len(self.members)))
@@ -143,9 +134,20 @@ class Batch:
         return own
 
 
-def _axes(model: RigidModel) -> MotionAxes:
+def axes_of(model: RigidModel) -> MotionAxes:
+    """Make memory of its own for a robot that compiled code computes, at rest."""
     n = model.bodies.before.size
     return model.motion_axes(make_dynamics(model.bodies), np.zeros(n), np.zeros(n))
+
+
+def refresh_apart(plans: Sequence[Plan], robot: AdapterBase, t: float) -> None:
+    """Bring plans of the same tasks up to date, without beginning for the tasks what they have not."""
+    tasks = [m.task for m in plans[0].members if isinstance(m.task, TrackingTask)]
+    progress = [task.progress for task in tasks]
+    for plan in plans:
+        plan.refresh(robot, t)
+    for task, before in zip(tasks, progress, strict=True):
+        task.recall(before)
 
 
 def cores() -> int:
