@@ -33,9 +33,7 @@ class Beside:
         robot = osc.load_robot("puma560")
         self.n, self.count, self.robot = robot.nv, count, robot
         stack, self.later = make(robot)
-        self.fleet = osc.Fleet(
-            robot, osc.Stack(stack), count, device="cpu", dtype=dtype, **options
-        )
+        self.fleet = osc.Fleet(robot, osc.Stack(stack), count, device="cpu", dtype=dtype, **options)
         self.stacks, self.controllers, self.others = [], [], []
         for _ in range(count):
             own = osc.load_robot("puma560")

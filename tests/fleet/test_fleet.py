@@ -2,18 +2,11 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 import opspace as osc
-from tests.fleet.fleets import LEVELS, Beside
+from tests.fleet.fleets import Beside
 
 pytest.importorskip("warp", reason="fleets run in Warp: pip install 'opspace[gpu]'")
-
-
-@pytest.fixture(scope="module")
-def beside():
-    return Beside().prepare()
 
 
 def test_random_states_with_limits_and_singular_postures():
@@ -28,57 +21,40 @@ def test_random_states_with_limits_and_singular_postures():
     assert wanted in osc.Status(seen)
 
 
-requests = st.tuples(
-    st.integers(0, 30),
-    st.sampled_from(["insert", "remove", "move", "swap"]),
-    st.sampled_from(["position", "orientation", "elbow"]),
-    st.integers(0, 2),
-    st.sampled_from([0.0, 0.02, 0.1]),
-    st.sampled_from(["quintic", "cubic", "linear"]),
-    st.lists(st.booleans(), min_size=6, max_size=6),
-)
-
-
-@settings(max_examples=12)
-@given(program=st.lists(requests, max_size=8), seed=st.integers(0, 2**32 - 1))
-def test_random_programs_of_requests_for_some_robots(program, seed):
+def test_transitions_of_some_robots():
     both = Beside().prepare()
-    rng = np.random.default_rng(seed)
-    Q, V = both.states(rng)
-    for k in range(32):
-        for request in program:
-            if request[0] == k:
-                ask(both, *request[1:])
+    rng = np.random.default_rng(2)
+    Q, V = both.states(rng, spread=0.4)
+    program = {
+        2: lambda x, some: x.swap("position", "orientation", 0.1, **some([0, 2, 4])),
+        5: lambda x, some: x.move("position", 2, 0.05, **some([1, 3])),
+        8: lambda x, some: x.remove("orientation", 0.04, **some([1, 4, 5])),
+        12: lambda x, some: x.insert("orientation", 1, 0.06, **some([5])),
+        20: lambda x, some: x.swap("position", "orientation", 0.0, **some([2])),
+    }
+    for k in range(36):
+        if k == 3:
+            both.fleet.insert("elbow", 0, 0.08, profile="cubic", robots=[0, 1])
+            for i in (0, 1):
+                both.stacks[i].insert(both.others[i], 0, 0.08, profile="cubic")
+        if k in program:
+            program[k](both.fleet, lambda robots: {"robots": robots})
+            for i, stack in enumerate(both.stacks):
+                for_one = Only(stack, i)
+                program[k](for_one, lambda robots: {"robots": robots})
         both.assert_same(0.005 * k, Q + 0.005 * k * V, V)
 
 
-def ask(both, kind, name, level, duration, profile, mask):
-    """Ask the fleet and the controllers of the robots that can do it for the same."""
-    level = LEVELS[name][level % len(LEVELS[name])]
-    other = "orientation" if name == "position" else "position"
-    timing = {"duration": duration, "profile": profile}
-    able = []
-    for i, (stack, later) in enumerate(zip(both.stacks, both.others, strict=True)):
-        task = later if name == "elbow" else both.first[i][name]
-        try:
-            if not mask[i]:
-                continue
-            if kind == "insert":
-                stack.insert(task, level, **timing)
-            elif kind == "remove":
-                stack.remove(name, **timing)
-            elif kind == "move":
-                stack.move(name, level, **timing)
-            elif name != "elbow":
-                stack.swap(name, other, **timing)
-            else:
-                continue
-        except osc.OpspaceError:
-            continue
-        able.append(i)
-    if able and kind == "swap":
-        both.fleet.swap(name, other, **timing, robots=able)
-    elif able and kind == "remove":
-        both.fleet.remove(name, **timing, robots=able)
-    elif able:
-        getattr(both.fleet, kind)(name, level, **timing, robots=able)
+class Only:
+    """The stack of one robot, which does what a fleet is asked to do with it."""
+
+    def __init__(self, stack, i):
+        self._stack, self._i = stack, i
+
+    def __getattr__(self, name):
+        def ask(*given, robots):
+            if self._i in robots:
+                task = self._stack[given[0]] if name == "insert" else given[0]
+                getattr(self._stack, name)(task, *given[1:])
+
+        return ask

@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 
 from opspace.controller import Controller
-from opspace.errors import InputError, unknown_name
+from opspace.errors import InputError
 from opspace.fleet.check_fleet import check_robot, check_task
 from opspace.fleet.precision import dtype_name
 from opspace.fleet.program import Program
-from opspace.fleet.roster import Activations, FleetMember, FleetPlace, checked, swap
+from opspace.fleet.roster import Roster
 from opspace.fleet.task_arrays import TaskArrays
 from opspace.fleet.warp_library import as_warp, device_of, robots_of, warp
 from opspace.plan.plan import Plan
@@ -26,17 +25,6 @@ from opspace.tasks.validation import finite
 
 BLOCK = 32
 """Threads of a block: with more, a few thousand robots would leave most of a graphics card idle."""
-
-
-@dataclass(frozen=True)
-class _Asked:
-    """A request that waits for the next step.
-
-    Attributes:
-        happen: Does it at a time, s, and tells whether there are new places.
-    """
-
-    happen: Callable[[float], bool]
 
 
 class Fleet:
@@ -115,12 +103,11 @@ class Fleet:
         )
         check_robot(self._controller)
         self.robot = robot
-        self._members: dict[str, FleetMember] = {}
+        self._roster = Roster(count)
+        self._arrays: dict[str, TaskArrays] = {}
         for level, tasks in stack.levels_by_number.items():
             for task in tasks:
-                self._add(check_task(task), level, inside=True)
-        self._start = [(member, member.level.copy()) for member in self._members.values()]
-        self._queue: list[_Asked] = []
+                self._roster.start_with(check_task(task), level)
         n, sides = robot.nv, stack.limits.sides if stack.limits else ()
         self.limit_names = tuple(side.name for side in sides)
         self.tau = self._zeros((count, n))
@@ -129,12 +116,12 @@ class Fleet:
         self.hard_solves = wp.zeros(count, dtype=wp.int32, device=self.device)
         self._time = wp.zeros(1, dtype=wp.float64, device=self.device)
         self._plan: Plan | None = None
-        self._variables: list[Activations] = []
         self._lay_out()
 
     def __repr__(self) -> str:
-        names = ", ".join(self._members)
-        return f"Fleet of {self.count} {self.robot.name!r} on {self.device}, {self.dtype}; tasks: {names}"
+        names = ", ".join(self._arrays)
+        where = f"on {self.device}, {self.dtype}"
+        return f"Fleet of {self.count} {self.robot.name!r} {where}; tasks: {names}"
 
     def __getitem__(self, name: str) -> TaskArrays:
         """Return what a task of this name is told and tells.
@@ -142,11 +129,11 @@ class Fleet:
         Raises:
             UnknownNameError: There is none.
         """
-        return self._member(name).arrays
+        return self._arrays[self._roster.find(str(name)).name]
 
     def __iter__(self) -> Iterator[TaskArrays]:
         """Iterate over the tasks, also those that no robot has in its stack at the moment."""
-        return (member.arrays for member in self._members.values())
+        return iter(self._arrays.values())
 
     def __len__(self) -> int:
         """Count the robots."""
@@ -177,7 +164,7 @@ class Fleet:
         """
         wp = warp()
         times = self._times(t)
-        if self._queue:
+        if self._roster.asked:
             self._happen(t)
         real, device = self._real, self.device
         robot = self.robot
@@ -185,8 +172,6 @@ class Fleet:
         v_ = as_warp(v, "v", (self.count, robot.nv), real, device)
         into = self.tau if tau is None else tau
         tau_ = as_warp(into, "tau", (self.count, robot.nv), real, device)
-        for member in self._members.values():
-            member.arrays.upload()
         program = self._program
         inputs = [
             times, q_, v_, tau_, program.fixed, program.whole, self._ramps, self._groups,
@@ -206,15 +191,12 @@ class Fleet:
     def _happen(self, t: Any) -> None:
         """Let the requests begin that have been made since the last step."""
         now = float(np.max(t.numpy())) if hasattr(t, "numpy") else float(t)
-        new = False
-        for asked in self._queue:
-            new |= asked.happen(now)
-        self._queue.clear()
-        if new:
-            for member in self._members.values():
-                member.tidy(now)
+        if self._roster.happen(now) or self._plan is None:
             self._lay_out()
-        self._upload_ramps()
+        else:
+            self._ramps.assign(self._roster.ramps(self._plan.variables))
+        for arrays in self._arrays.values():
+            arrays.begin_again(self._roster.members[arrays.name].epoch)
 
     # --- Requests --------------------------------------------------------------------------------
 
@@ -246,23 +228,11 @@ class Fleet:
             UnknownNameError: A frame or joint that the robot does not have, or an unknown profile.
         """
         timing, mask = Timing(duration, profile), robots_of(robots, self.count)
-        number = checked_level(level)
-        name = task if isinstance(task, str) else checked_task(task).name
-        found = self._members.get(name)
-        if found is not None:
-            self._same(task, found)
-            elsewhere = mask & found.inside & (found.level != number)
-            if elsewhere.any():
-                first = int(np.argmax(elsewhere))
-                raise InputError(
-                    f"task {name!r} is in the stack of robot {first} already, at level "
-                    f"{found.level[first]:g}; use move({name!r}, {number:g})"
-                )
-        new = found is None
-        member = self._known(task, number)
-        member.inside |= mask
-        member.level[mask] = number
-        self._ask(lambda t: member.insert(number, mask, timing, t) or new)
+        number, roster = checked_level(level), self._roster
+        if not isinstance(task, str) and checked_task(task).name not in roster.members:
+            self._controller.stack.prepare(check_task(task))
+            roster.take_in(task, number)
+        roster.insert(task, number, mask, timing)
 
     def remove(
         self,
@@ -286,15 +256,7 @@ class Fleet:
             InputError: A number that cannot be used.
             UnknownNameError: No such task, or an unknown profile.
         """
-        timing, mask = Timing(duration, profile), robots_of(robots, self.count)
-        member = self._member(task)
-        member.inside &= ~mask
-
-        def happen(t: float) -> bool:
-            member.presence.send(0.0, mask, timing, t)
-            return False
-
-        self._ask(happen)
+        self._roster.remove(task, robots_of(robots, self.count), Timing(duration, profile))
 
     def move(
         self,
@@ -319,13 +281,7 @@ class Fleet:
             UnknownNameError: No such task, or an unknown profile.
         """
         timing, mask = Timing(duration, profile), robots_of(robots, self.count)
-        number = checked_level(level)
-        member = checked(self._members, self._member(task).arrays.name, mask)
-        member.level[mask] = number
-        if mask.any():
-            self._ask(lambda t: member.move(number, mask, timing, t))
-        else:
-            self._ask(lambda _: member.make_room(number))
+        self._roster.move(task, checked_level(level), mask, timing)
 
     def swap(
         self,
@@ -351,13 +307,7 @@ class Fleet:
             UnknownNameError: No such task, or an unknown profile.
         """
         timing, mask = Timing(duration, profile), robots_of(robots, self.count)
-        a, b = (
-            checked(self._members, self._member(task).arrays.name, mask) for task in (first, second)
-        )
-        if a is b:
-            raise InputError(f"swap takes two different tasks, got {a.arrays.name!r} twice")
-        a.level[mask], b.level[mask] = b.level[mask], a.level[mask]
-        self._ask(lambda t: swap(a, b, mask, timing, t))
+        self._roster.swap(first, second, mask, timing)
 
     def reset(self, robots: Any = None) -> None:
         """Let some robots begin anew at the next step, as at the first one.
@@ -369,71 +319,18 @@ class Fleet:
         Args:
             robots: None for all, a mask (count,), or their numbers.
         """
-        mask = robots_of(robots, self.count)
-        start = {id(member): level for member, level in self._start}
-        for member in self._members.values():
-            there = id(member) in start
-            member.inside[mask] = there
-            if there:
-                member.level[mask] = start[id(member)][mask]
-
-        def happen(t: float) -> bool:
-            new = False
-            for member in self._members.values():
-                there = id(member) in start
-                member.presence.rest(float(there), mask, "quintic")
-                member.arrays.begin_again(mask)
-                if there:
-                    for level in np.unique(start[id(member)][mask]):
-                        here = mask & (start[id(member)] == level)
-                        new |= member.go_back(level, here)
-            return new
-
-        self._ask(happen)
+        self._roster.reset(robots_of(robots, self.count))
 
     # --- Layout ----------------------------------------------------------------------------------
 
-    def _ask(self, happen: Callable[[float], bool]) -> None:
-        self._queue.append(_Asked(happen))
-
-    def _member(self, task: Task | str) -> FleetMember:
-        name = task.name if isinstance(task, Task) else str(task)
-        if name not in self._members:
-            raise unknown_name("task of the fleet", name, self._members)
-        found = self._members[name]
-        self._same(task, found)
-        return found
-
-    def _same(self, task: Task | str, found: FleetMember) -> None:
-        if isinstance(task, Task) and task is not found.arrays.task:
-            raise InputError(
-                f"another task named {task.name!r} is in the fleet; give this one a name of its own "
-                "(name=...)"
-            )
-
-    def _known(self, task: Task | str, level: float) -> FleetMember:
-        """Return a task that the fleet has, or take a new one in, outside of every stack."""
-        if isinstance(task, str) or task.name in self._members:
-            return self._member(task)
-        self._controller.stack.prepare(checked_task(task))
-        return self._add(check_task(task), level, inside=False)
-
-    def _add(self, task: Any, level: float, *, inside: bool) -> FleetMember:
-        arrays = TaskArrays(task, self.count, self._real, self.device)
-        member = self._members[task.name] = FleetMember(
-            arrays,
-            Activations(self.count, float(inside)),
-            [FleetPlace(level)],
-            np.full(self.count, inside),
-            np.full(self.count, level),
-        )
-        return member
-
     def _lay_out(self) -> None:
         """Make the plan, the kernel and the arrays for the tasks and levels that there are."""
-        members = [member.member for member in self._members.values()]
-        plan, before = self._controller.plan_apart(tuple(members)), self._plan
-        arrays = [member.arrays for member in self._members.values()]
+        roster, before = self._roster, self._plan
+        plan = self._controller.plan_apart(roster.present)
+        for name, member in roster.members.items():
+            if name not in self._arrays:
+                self._arrays[name] = TaskArrays(member.task, self.count, self._real, self.device)
+        arrays = list(self._arrays.values())
         for one, packed in zip(arrays, plan.packed, strict=True):
             one.begin(plan.tick, packed.index, packed.rows)
         groups = np.zeros((self.count, len(plan.variables)), np.int64)
@@ -444,26 +341,9 @@ class Fleet:
                     groups[:, k] = old[:, before.variables.index(variable)]
         wp = warp()
         self._groups = wp.array(groups, dtype=wp.int64, device=self.device)
-        known = {
-            on.variable: on
-            for member in self._members.values()
-            for on in (member.presence, *(place.on for place in member.places))
-            if on is not None
-        }
-        self._variables = [known[variable] for variable in plan.variables]
-        self._ramps = wp.array(self._packed_ramps(), dtype=wp.float64, device=self.device)
+        self._ramps = wp.array(roster.ramps(plan.variables), dtype=wp.float64, device=self.device)
         self._program = Program(plan, arrays, self.dtype, self.device)
         self._plan = plan
-
-    def _packed_ramps(self) -> np.ndarray:
-        shape = (self.count, len(self._variables), 9)
-        if not self._variables:
-            return np.zeros(shape)
-        return np.stack([on.ramps for on in self._variables], axis=1)
-
-    def _upload_ramps(self) -> None:
-        if self._variables:
-            self._ramps.assign(self._packed_ramps())
 
     def _zeros(self, shape: tuple[int, ...]) -> Any:
         return warp().zeros(shape, dtype=self._real, device=self.device)

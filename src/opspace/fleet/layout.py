@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator, Mapping, Sequence
-from typing import NamedTuple
+from collections.abc import Callable, Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -29,23 +28,6 @@ BEGUN = ("kind", "numbers", "limit")
 """What the plan begins and a tick goes on with, each robot for itself."""
 EMPTY = ("U", "motors", "M", "bias", "placement", "velocity", "acceleration", "force", "inertia")
 """What a tick does not write everywhere and reads as zero there."""
-
-
-class Place(NamedTuple):
-    """One array of a tick.
-
-    Attributes:
-        path: Its name in the records, as C++ reaches it.
-        kind: Name of its type.
-        array: The plan's.
-        begins: ``"shared"`` by all robots, ``"copied"`` from what is shared, ``"empty"`` or
-            ``"anything"``.
-    """
-
-    path: str
-    kind: str
-    array: np.ndarray
-    begins: str
 
 
 class Layout:
@@ -96,7 +78,7 @@ class Layout:
             if memory is None or not array.size:
                 memory = self._memory[id(array)] = self._begin(field, path, array)
             fields.append(f"{name}.{path} = {kind}{{{memory}}};")
-        self._structs += _structs(f"Of_{name}", record, self._kinds, self._kind)
+        self._structs += _structs(f"Of_{name}", record, self._kind)
         self._lines += fields
 
     def _kind(self, path: str, array: np.ndarray) -> str:
@@ -155,13 +137,13 @@ def _arrays(record: Record, prefix: str) -> Iterator[tuple[str, Field, np.ndarra
             yield path, field, value
 
 
-def _structs(name: str, record: Record, kinds: object, kind: object) -> list[str]:
+def _structs(name: str, record: Record, kind: Callable[[str, np.ndarray], str]) -> list[str]:
     found: list[str] = []
     fields: list[str] = []
     for field, value in zip(record._table.fields, record, strict=True):
         if isinstance(value, Record):
             inner = f"{name}_{field.name}"
-            found += _structs(inner, value, kinds, kind)
+            found += _structs(inner, value, kind)
             fields.append(f"{inner} {field.name}_;")
         else:
             fields.append(f"{kind(f'{field.name}_', value)} {field.name}_;")

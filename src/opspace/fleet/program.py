@@ -1,6 +1,6 @@
 """The kernel of a fleet: the tick of a plan for one robot per thread."""
 
-# No `annotations` from the future: Warp reads the arguments of kernels.
+from __future__ import annotations
 
 import re
 from functools import cache
@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from opspace.fleet.fleet_kernel import fleet_kernel
 from opspace.fleet.layout import Layout
 from opspace.fleet.one_robot import robot_tick
 from opspace.fleet.precision import constants_of
@@ -25,7 +26,12 @@ LOOP = re.compile(r"^( *)(for \(I )", re.M)
 ROLLED = {"cpu": r'\1_Pragma("clang loop unroll(disable)") \2', "cuda": r"\1\2"}
 """A processor has caches for what is computed in a loop, and its compiler takes three times as long for
 loops that are rolled out."""
-OPTIMISATION = {"cpu": 1, "cuda": 3}
+OPTIONS = {
+    "cpu": (("optimization_level", 1), ("cpu_compiler_flags", "-march=native")),
+    "cuda": (),
+}
+"""Of Warp's compiler. What is left out of the first one's own takes ten times as long and gives slower
+code: it would write every kernel out where it is called."""
 
 
 class Program:
@@ -71,7 +77,7 @@ class Program:
             ]
         )
         kind = "cpu" if device.is_cpu else "cuda"
-        self.kernel = _kernel(LOOP.sub(ROLLED[kind], text), dtype, kind)
+        self.kernel = fleet_kernel(LOOP.sub(ROLLED[kind], text), dtype, OPTIONS[kind])
         self.fixed = wp.array(layout.numbers, dtype=real, device=device)
         whole = np.concatenate([layout.integers, np.array(self._addresses, np.int64)])
         self.whole = wp.array(whole, dtype=wp.int64, device=device)
@@ -128,47 +134,3 @@ def _translated(dtype: str) -> tuple[str, str]:
     return translate(robot_tick, constants_of(dtype))
 
 
-@cache
-def _kernel(text: str, dtype: str, kind: str) -> Any:
-    """Make the kernel of this code; Warp compiles it at its first launch and keeps it on the disk."""
-    wp = warp()
-    real = getattr(wp, dtype)
-    flags = {"optimization_level": OPTIMISATION[kind]}
-    if kind == "cpu":
-        flags["cpu_compiler_flags"] = "-march=native"
-
-    @wp.func_native(text)
-    def fleet_robot(
-        i: int,
-        times: wp.array(dtype=wp.float64),
-        q: wp.array2d(dtype=real),
-        v: wp.array2d(dtype=real),
-        tau: wp.array2d(dtype=real),
-        fixed_: wp.array(dtype=real),
-        whole_: wp.array(dtype=wp.int64),
-        ramps: wp.array3d(dtype=wp.float64),
-        groups: wp.array2d(dtype=wp.int64),
-        status: wp.array(dtype=wp.int32),
-        solves: wp.array(dtype=wp.int32),
-        limits: wp.array2d(dtype=real),
-    ): ...
-
-    @wp.kernel(module="unique", enable_backward=False, module_options=flags)
-    def fleet_tick(
-        times: wp.array(dtype=wp.float64),
-        q: wp.array2d(dtype=real),
-        v: wp.array2d(dtype=real),
-        tau: wp.array2d(dtype=real),
-        fixed_: wp.array(dtype=real),
-        whole_: wp.array(dtype=wp.int64),
-        ramps: wp.array3d(dtype=wp.float64),
-        groups: wp.array2d(dtype=wp.int64),
-        status: wp.array(dtype=wp.int32),
-        solves: wp.array(dtype=wp.int32),
-        limits: wp.array2d(dtype=real),
-    ):
-        fleet_robot(
-            wp.tid(), times, q, v, tau, fixed_, whole_, ramps, groups, status, solves, limits
-        )
-
-    return fleet_tick

@@ -1,251 +1,286 @@
-"""The tasks of a fleet: one layout for all robots, and activations in time for each of them."""
+"""The tasks of a fleet, and what is asked of them for some robots."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
-from opspace.errors import InputError
-from opspace.fleet.task_arrays import TaskArrays
+from opspace.errors import InputError, unknown_name
+from opspace.fleet.activations import Activations
+from opspace.fleet.fleet_member import FleetMember, FleetPlace
 from opspace.kernels.columns import VARIABLE_SIZE
-from opspace.law import PROFILES, Ramp
 from opspace.stack.changes import Timing
-from opspace.stack.members import Member, Place, Variable
-
-CODE, TARGET, START, DURATION = range(4)
-"""Columns of an activation in time."""
+from opspace.stack.members import Member, Variable
 
 
-class Activations:
-    """One activation in time of every robot.
+class Roster:
+    """The tasks of all robots of a fleet.
+
+    Requests are checked at once against what there will be when all of them have happened, and happen
+    with the next step. Every robot goes through what its own `opspace.Stack` would; the layout, in
+    which places are those of all robots, only grows. So a robot that rests begins from the first
+    place of its level again, and a few places are enough for ever.
 
     Args:
         count: Number of robots.
-        value: 0.0 or 1.0, where it rests.
-        profile: Name of the profile.
-        shared: Whether it moves two tasks, which none of them may turn alone.
 
     Attributes:
-        ramps: (count, VARIABLE_SIZE), each as `opspace.law.scalars.ramp` takes it.
-        variable: What stands for it in a plan.
+        members: The tasks by name.
     """
 
-    def __init__(
-        self, count: int, value: float, profile: str = "quintic", *, shared: bool = False
-    ) -> None:
-        self.ramps = np.tile(_packed(Ramp.resting(value, profile)), (count, 1))
-        self.variable = Variable(value, profile)
-        self.shared = shared
+    def __init__(self, count: int) -> None:
+        self.count = count
+        self.members: dict[str, FleetMember] = {}
+        self._start: dict[str, float] = {}
+        self._queue: list[Callable[[float], bool]] = []
 
-    @property
-    def targets(self) -> np.ndarray:
-        """Where it rests or goes, (count,) of 0 and 1."""
-        return self.ramps[:, TARGET]
+    def start_with(self, task: Any, level: float) -> None:
+        """Add a task that all robots have from the start."""
+        self.members[task.name] = FleetMember(task, self.count, level, inside=True)
+        self._start[task.name] = level
 
-    def resting(self, value: float, t: float) -> np.ndarray:
-        """Tell at which robots it rests at this value at time ``t`` [s], (count,)."""
-        end = self.ramps[:, START] + self.ramps[:, DURATION]
-        return (self.targets == value) & ((self.ramps[:, DURATION] == 0.0) | (t >= end))
+    def take_in(self, task: Any, level: float) -> FleetMember:
+        """Add a task that no robot has yet."""
+        member = FleetMember(task, self.count, level, inside=False)
+        self.members[task.name] = member
+        self._queue.append(lambda _: True)
+        return member
 
-    def send(self, target: float, robots: np.ndarray, timing: Timing, t: float) -> None:
-        """Turn it towards 0 or 1 at time ``t`` [s], as `opspace.stack.members.Variable.send` does.
+    def find(self, task: Any) -> FleetMember:
+        """Return a task, given itself or its name.
 
-        Robots whose activations are alike are gone through once.
+        Raises:
+            InputError: Another task has its name.
+            UnknownNameError: There is none.
         """
-        rows, which = np.unique(self.ramps[robots], axis=0, return_inverse=True)
-        sent = np.empty_like(rows)
-        for row, into in zip(rows, sent, strict=True):
-            variable = Variable(0.0)
-            variable.ramp = Ramp(PROFILES[int(row[CODE])], *row[1:].tolist())
-            variable.send(target, timing.duration, t, timing.profile)
-            into[:] = _packed(variable.ramp)
-        self.ramps[robots] = sent[which.reshape(-1)]
-
-    def rest(self, value: float, robots: np.ndarray, profile: str) -> None:
-        """Let it rest at 0 or 1 at once, where the task is out and nobody sees it."""
-        self.ramps[robots] = _packed(Ramp.resting(value, profile))
-
-
-def _packed(ramp: Ramp) -> np.ndarray:
-    found = np.array([PROFILES.index(ramp.profile), *ramp.numbers])
-    assert found.size == VARIABLE_SIZE
-    return found
-
-
-@dataclass(frozen=True)
-class FleetPlace:
-    """A level where a task may be.
-
-    Attributes:
-        level: Number of the level.
-        on: How far the task has come here from the place before; None for the first place.
-        kept: Whether it stays although no robot needs it.
-    """
-
-    level: float
-    on: Activations | None = None
-    kept: bool = False
-
-
-@dataclass
-class FleetMember:
-    """A task of a fleet.
-
-    Attributes:
-        arrays: What it is told and tells.
-        presence: 0 outside, 1 inside, of every robot.
-        places: The levels where it may be; it is at the last one that is on.
-        inside: At which robots it is, or will be when everything that is asked for has happened.
-        level: At which level then, of every robot.
-    """
-
-    arrays: TaskArrays
-    presence: Activations
-    places: list[FleetPlace]
-    inside: np.ndarray
-    level: np.ndarray
+        name = task if isinstance(task, str) else task.name
+        if name not in self.members:
+            raise unknown_name("task of the fleet", name, self.members)
+        found = self.members[name]
+        if not isinstance(task, str) and task is not found.task:
+            raise InputError(
+                f"another task named {name!r} is in the fleet; give this one a name of its own "
+                "(name=...)"
+            )
+        return found
 
     @property
-    def member(self) -> Member:
-        """The task as a plan takes it."""
-        places = tuple(Place(p.level, p.on and p.on.variable) for p in self.places)
-        return Member(self.arrays.task, self.presence.variable, places)
+    def asked(self) -> bool:
+        """Whether requests wait."""
+        return bool(self._queue)
 
-    def insert(self, level: float, robots: np.ndarray, timing: Timing, t: float) -> bool:
-        """Send the task in, and tell whether that needs a place which there was not."""
-        if not robots.any():
-            return self.make_room(level)
-        out = robots & self.presence.resting(0.0, t)
-        new = self.move(level, out, Timing(0.0, timing.profile), t)
-        new |= self.move(level, robots & ~out, timing, t)
-        self.presence.rest(0.0, out, timing.profile)
-        self.presence.send(1.0, robots, timing, t)
-        self.arrays.begin_again(out)
+    @property
+    def present(self) -> tuple[Member, ...]:
+        """The tasks as a plan takes them."""
+        return tuple(member.member for member in self.members.values())
+
+    def ramps(self, variables: tuple[Variable, ...]) -> np.ndarray:
+        """Return the activations in time, (count, variables, VARIABLE_SIZE), in the order of a plan."""
+        known = {on.variable: on for m in self.members.values() for on in m.activations}
+        found = np.zeros((self.count, len(variables), VARIABLE_SIZE))
+        for k, variable in enumerate(variables):
+            found[:, k] = known[variable].ramps
+        return found
+
+    def happen(self, t: float) -> bool:
+        """Let everything begin at time ``t`` [s] that has been asked for.
+
+        Returns:
+            Whether there are new tasks or places.
+        """
+        waiting, self._queue = self._queue, []
+        new = False
+        for request in waiting:
+            new |= request(t)
         return new
 
-    def move(self, level: float, robots: np.ndarray, timing: Timing, t: float) -> bool:
-        """Send the task to a level, and tell whether it has become a place that there was not.
+    # --- Requests --------------------------------------------------------------------------------
 
-        It goes back over its own steps where it can, as `opspace.stack.members.Member.move` does.
+    def insert(self, task: Any, level: float, robots: np.ndarray, timing: Timing) -> None:
+        """Ask for a task, which has been taken in.
+
+        Raises:
+            InputError: Some of the robots have it at another level.
         """
+        member = self.find(task)
+        elsewhere = robots & member.inside & (member.level != level)
+        if elsewhere.any():
+            first = int(np.argmax(elsewhere))
+            raise InputError(
+                f"task {member.name!r} is in the stack of robot {first} already, at level "
+                f"{member.level[first]:g}; use move({member.name!r}, {level:g})"
+            )
+        member.inside |= robots
+        member.level[robots] = level
+        self._ask(self._insert, member, level, robots, timing)
+
+    def remove(self, task: Any, robots: np.ndarray, timing: Timing) -> None:
+        """Ask that a task leaves."""
+        member = self.find(task)
+        member.inside &= ~robots
+
+        def happen(t: float) -> bool:
+            member.presence.send(0.0, robots & ~member.presence.resting(0.0, t), timing, t)
+            return False
+
+        self._queue.append(happen)
+
+    def move(self, task: Any, level: float, robots: np.ndarray, timing: Timing) -> None:
+        """Ask for another level.
+
+        Raises:
+            InputError: Some of the robots do not have the task.
+        """
+        member = self._had(task, robots)
+        member.level[robots] = level
+        self._ask(self._move, member, level, robots, timing)
+
+    def swap(self, first: Any, second: Any, robots: np.ndarray, timing: Timing) -> None:
+        """Ask that two tasks exchange their levels.
+
+        Raises:
+            InputError: The same task twice, or some of the robots do not have both.
+        """
+        a, b = self._had(first, robots), self._had(second, robots)
+        if a is b:
+            raise InputError(f"swap takes two different tasks, got {a.name!r} twice")
+        a.level[robots], b.level[robots] = b.level[robots], a.level[robots]
+        self._ask(self._swap, a, b, robots, timing)
+
+    def reset(self, robots: np.ndarray) -> None:
+        """Ask that robots have the stacks of the start, at once."""
+        for member in self.members.values():
+            there = member.name in self._start
+            member.inside[robots] = there
+            if there:
+                member.level[robots] = self._start[member.name]
+        self._queue.append(lambda t: self._reset(robots, t))
+
+    def _ask(self, request: Callable[..., bool], *given: Any) -> None:
+        self._queue.append(lambda t: request(*given, t))
+
+    def _had(self, task: Any, robots: np.ndarray) -> FleetMember:
+        found = self.find(task)
+        lacking = robots & ~found.inside
+        if lacking.any():
+            raise InputError(
+                f"{int(lacking.sum())} of these robots have no task {found.name!r} in their stack, "
+                f"the first is number {int(np.argmax(lacking))}"
+            )
+        return found
+
+    # --- What happens ----------------------------------------------------------------------------
+
+    def _insert(
+        self, member: FleetMember, level: float, robots: np.ndarray, timing: Timing, t: float
+    ) -> bool:
+        if not robots.any():
+            return member.make_room(level)
+        self._settle(robots, t)
+        out = robots & member.presence.resting(0.0, t)
+        new = member.put(level, out, t)
+        back = robots & ~out & (member.levels() != level)
+        new |= member.move(level, back, timing, t)
+        member.presence.rest(0.0, out)
+        member.presence.send(1.0, robots, timing, t)
+        member.epoch[out] += 1
+        return new
+
+    def _move(
+        self, member: FleetMember, level: float, robots: np.ndarray, timing: Timing, t: float
+    ) -> bool:
+        if not robots.any():
+            return member.make_room(level)
+        self._settle(robots, t)
+        return member.move(level, robots, timing, t)
+
+    def _swap(
+        self, a: FleetMember, b: FleetMember, robots: np.ndarray, timing: Timing, t: float
+    ) -> bool:
+        """Exchange the levels of two tasks, by one activation for both.
+
+        Robots at which the tasks are at other levels have an activation of their own. For no robot
+        places are made for those that will come.
+        """
+        self._settle(robots, t)
         waiting = robots.copy()
-        for k in reversed(range(len(self.places))):
-            if self.places[k].level == level and waiting.any():
-                waiting &= ~self._turned(k, waiting, timing, t)
-        if not waiting.any():
-            return False
-        self._add(level, waiting, timing, t)
-        return True
-
-    def make_room(self, level: float) -> bool:
-        """Keep a place for robots that will come, and tell whether there was none."""
-        if any(place.level == level for place in self.places):
-            self.places = [
-                replace(place, kept=place.kept or place.level == level) for place in self.places
-            ]
-            return False
-        self.places.append(FleetPlace(level, Activations(self.inside.size, 0.0), kept=True))
-        return True
-
-    def _add(self, level: float, robots: np.ndarray, timing: Timing, t: float) -> None:
-        """Add a place, and send these robots there."""
-        on = Activations(robots.size, 0.0, timing.profile)
-        on.send(1.0, robots, timing, t)
-        self.places.append(FleetPlace(level, on))
-
-    def _turned(self, goal: int, robots: np.ndarray, timing: Timing, t: float) -> np.ndarray:
-        """Make a place the goal by turning activations, and tell of which robots that was possible."""
-        wanted = [
-            (place.on, 1.0 if k == goal else 0.0)
-            for k, place in enumerate(self.places)
-            if k >= goal and place.on is not None
-        ]
-        able = robots.copy()
-        for on, target in wanted:
-            if on.shared:
-                able &= on.targets == target
-        for on, target in wanted:
-            if not on.shared:
-                on.send(target, able, timing, t)
-        return able
-
-    def go_back(self, level: float, robots: np.ndarray) -> bool:
-        """Let the task be at a level at once, and tell whether it has become a place.
-
-        A swap that another task has a part in ends for both.
-        """
-        for k, place in enumerate(self.places):
-            if place.level == level:
-                for j, other in enumerate(self.places):
-                    if other.on is not None:
-                        other.on.rest(float(j == k), robots, "quintic")
-                return False
-        on = Activations(robots.size, 0.0)
-        on.rest(1.0, robots, "quintic")
-        self.places.append(FleetPlace(level, on))
-        return True
-
-    def tidy(self, t: float) -> None:
-        """Forget the places that all robots have left, or that none will come to."""
-        left: list[FleetPlace] = []
-        for place in self.places:
-            if place.on is None or place.kept or not place.on.resting(0.0, t).all():
-                everywhere = place.on is not None and place.on.resting(1.0, t).all()
-                if everywhere and not any(one.kept for one in left):
-                    left = [FleetPlace(place.level)]
-                else:
-                    left.append(place)
-        self.places = left
-
-    def levels(self) -> np.ndarray:
-        """Return at which level each robot has the task when everything has arrived, (count,)."""
-        level = np.full(self.inside.size, self.places[0].level)
-        for place in self.places[1:]:
-            assert place.on is not None
-            level[place.on.targets == 1.0] = place.level
-        return level
-
-
-def swap(a: FleetMember, b: FleetMember, robots: np.ndarray, timing: Timing, t: float) -> bool:
-    """Exchange the levels of two tasks, by one activation for both.
-
-    Robots at which the tasks are at other levels have an activation of their own. For no robot at all
-    places are kept for those that will come.
-
-    Returns:
-        Whether there are new places.
-    """
-    last = a.places[-1].on
-    if last is not None and last.shared and last is b.places[-1].on:
-        targets = last.targets.copy()
-        for target in (0.0, 1.0):
-            last.send(1.0 - target, robots & (targets == target), timing, t)
-        return False
-    new, prepared = False, not robots.any()
-    x, y = a.levels(), b.levels()
-    asked = robots if robots.any() else np.ones(robots.size, bool)
-    for first, second in sorted(set(zip(x[asked].tolist(), y[asked].tolist(), strict=True))):
-        if first != second:
-            on = Activations(robots.size, 0.0, timing.profile, shared=True)
-            on.send(1.0, robots & (x == first) & (y == second), timing, t)
-            a.places.append(FleetPlace(second, on, prepared))
-            b.places.append(FleetPlace(first, on, prepared))
+        for i, j, on in _common(a, b):
+            top = a.here(t)[i] & ~a.here(t)[i + 1 :].any(axis=0)
+            top &= b.here(t)[j] & ~b.here(t)[j + 1 :].any(axis=0)
+            turning = waiting & top & ~on.arrived(t)
+            targets = on.targets.copy()
+            for target in (0.0, 1.0):
+                on.send(1.0 - target, turning & (targets == target), timing, t)
+            waiting &= ~turning
+        x, y = a.levels(), b.levels()
+        for i, j, on in _common(a, b):
+            fits = (x == b.places[j].level) & (y == a.places[i].level) & on.resting(0.0, t)
+            fits &= ~a.here(t)[i:].any(axis=0) & ~b.here(t)[j:].any(axis=0)
+            on.send(1.0, waiting & fits, timing, t)
+            waiting &= ~fits
+        there = waiting if robots.any() else np.ones(self.count, bool)
+        new = False
+        for first, second in sorted(set(zip(x[there].tolist(), y[there].tolist(), strict=True))):
+            if first == second or (not robots.any() and _prepared(a, b, first, second)):
+                continue
+            a.make_room(second)
+            b.make_room(first)
+            on = Activations(self.count, 0.0, shared=True)
+            on.send(1.0, waiting & (x == first) & (y == second), timing, t)
+            a.places.append(FleetPlace(second, on))
+            b.places.append(FleetPlace(first, on))
             new = True
-    return new
+        return new
+
+    def _reset(self, robots: np.ndarray, t: float) -> bool:
+        new = False
+        for member in self.members.values():
+            for on in member.activations:
+                if on.shared:
+                    on.rest(0.0, robots)
+        for member in self.members.values():
+            there = member.name in self._start
+            member.presence.rest(float(there), robots)
+            member.epoch[robots] += 1
+            if there:
+                new |= member.put(self._start[member.name], robots, t)
+        return new
+
+    def _settle(self, robots: np.ndarray, t: float) -> None:
+        """Let robots that rest be at the first place of their levels, which nobody sees."""
+        still = robots.copy()
+        members = self.members.values()
+        for member in members:
+            levels = member.levels()
+            for on in member.activations[1:]:
+                still &= on.arrived(t)
+            own = {p.level for p in member.places if not (p.on and p.on.shared)}
+            still &= np.isin(levels, list(own))
+        if not still.any():
+            return
+        levels = [member.levels() for member in members]
+        for member in members:
+            for on in member.activations[1:]:
+                if on.shared:
+                    on.rest(0.0, still)
+        for member, level in zip(members, levels, strict=True):
+            for number in np.unique(level[still]):
+                member.put(float(number), still & (level == number), t)
 
 
-def checked(members: dict[str, FleetMember], name: str, robots: np.ndarray) -> FleetMember:
-    """Return a task that all these robots have.
+def _common(a: FleetMember, b: FleetMember) -> list[tuple[int, int, Activations]]:
+    """List the activations that move two tasks, each with its places."""
+    return [
+        (i, j, place.on)
+        for i, place in enumerate(a.places)
+        for j, other in enumerate(b.places)
+        if place.on is not None and place.on.shared and place.on is other.on
+    ]
 
-    Raises:
-        InputError: Some of them have not.
-    """
-    found = members[name]
-    lacking = robots & ~found.inside
-    if lacking.any():
-        raise InputError(
-            f"{int(lacking.sum())} of these robots have no task {name!r} in their stack, the first is "
-            f"number {int(np.argmax(lacking))}"
-        )
-    return found
+
+def _prepared(a: FleetMember, b: FleetMember, first: float, second: float) -> bool:
+    return any(
+        a.places[i].level == second and b.places[j].level == first for i, j, _ in _common(a, b)
+    )

@@ -57,9 +57,7 @@ class TaskArrays:
         self._size = 0
         self._joints = False
         self._start = 0
-        self.holds = np.full(count, task.target is None)
-        self.epoch = np.zeros(count, np.int64)
-        self._changed = True
+        self._wishes = np.full(count, task.target is None)
 
     def begin(self, tick: Record, i: int, rows: slice) -> None:
         """Take what the task is told from the arrays of a plan in which it is the task ``i``."""
@@ -92,23 +90,16 @@ class TaskArrays:
         self._turn, self._before = self._filled(np.zeros(4)), self._filled(np.zeros(4))
         self._joint_before = self._filled(np.zeros(m))
         self._remembers, self._seen = self._filled(0), self._filled(-1)
-        self._epoch, self._holds = self._filled(0), self._filled(0)
-        self.upload()
+        self._epoch = self._filled(0)
+        self._holds = self._filled(0)
+        self._holds.assign(self._wishes.astype(np.int64))
 
     def __repr__(self) -> str:
         return f"TaskArrays({self.name!r} of {self._count} robots on {self._device})"
 
-    def begin_again(self, robots: np.ndarray) -> None:
-        """Let the task begin anew with these robots, a mask."""
-        self.epoch[robots] += 1
-        self._changed = True
-
-    def upload(self) -> None:
-        """Bring to the device what has been asked for since."""
-        if self._changed and self._size:
-            self._epoch.assign(self.epoch)
-            self._holds.assign(self.holds.astype(np.int64))
-            self._changed = False
+    def begin_again(self, epoch: np.ndarray) -> None:
+        """Tell how often the task has begun with each robot, (count,)."""
+        self._epoch.assign(epoch)
 
     def set_target(
         self,
@@ -135,8 +126,8 @@ class TaskArrays:
             told.append((array, self._checked(0.0 if given is None else given, array, mask)))
         for array, row in told:
             _write(array, row, mask)
-        self.holds &= ~mask
-        self._changed = True
+        self._wishes &= ~mask
+        self._holds.assign(self._wishes.astype(np.int64))
 
     def set_gains(self, kp: ArrayLike, kv: ArrayLike | None = None, robots: Any = None) -> None:
         """Set gains of some robots from Python.
