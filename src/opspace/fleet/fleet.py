@@ -11,7 +11,7 @@ from opspace.controller import Controller
 from opspace.errors import InputError
 from opspace.fleet.check_fleet import check_robot, check_task
 from opspace.fleet.precision import dtype_name
-from opspace.fleet.program import Program
+from opspace.fleet.program import FleetProgram
 from opspace.fleet.roster import Roster
 from opspace.fleet.task_arrays import TaskArrays
 from opspace.fleet.warp_library import as_warp, device_of, robots_of, warp
@@ -342,7 +342,7 @@ class Fleet:
         wp = warp()
         self._groups = wp.array(groups, dtype=wp.int64, device=self.device)
         self._ramps = wp.array(roster.ramps(plan.variables), dtype=wp.float64, device=self.device)
-        self._program = Program(plan, arrays, self.dtype, self.device)
+        self._program = FleetProgram(plan, arrays, self.dtype, self.device)
         self._plan = plan
 
     def _zeros(self, shape: tuple[int, ...]) -> Any:

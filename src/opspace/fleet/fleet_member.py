@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from opspace.fleet.activations import Activations
+from opspace.fleet.fleet_activations import Activations
 from opspace.stack.changes import Timing
 from opspace.stack.members import Member, Place
 

@@ -30,7 +30,7 @@ EMPTY = ("U", "motors", "M", "bias", "placement", "velocity", "acceleration", "f
 """What a tick does not write everywhere and reads as zero there."""
 
 
-class Layout:
+class RobotLayout:
     """All arrays of a plan: what robots share, in two blocks, and what each works in.
 
     Args:

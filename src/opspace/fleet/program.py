@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 
 from opspace.fleet.fleet_kernel import fleet_kernel
-from opspace.fleet.layout import Layout
+from opspace.fleet.kernels_in_cpp import translate
+from opspace.fleet.layout import RobotLayout
 from opspace.fleet.one_robot import robot_tick
 from opspace.fleet.precision import constants_of
 from opspace.fleet.robot_record import ROBOT
 from opspace.fleet.task_arrays import TaskArrays
-from opspace.fleet.translate import translate
 from opspace.fleet.warp_library import warp
 from opspace.kernels.columns import VARIABLE_SIZE
 from opspace.plan.plan import Plan
@@ -23,18 +23,19 @@ START = 2
 """Column of an activation in time that holds when it starts."""
 
 LOOP = re.compile(r"^( *)(for \(I )", re.M)
-ROLLED = {"cpu": r'\1_Pragma("clang loop unroll(disable)") \2', "cuda": r"\1\2"}
-"""A processor has caches for what is computed in a loop, and its compiler takes three times as long for
-loops that are rolled out."""
+LAMBDA = re.compile(r"^(auto \w+ = \[&\]\([^)]*\)) \{$", re.M)
+ROLLED = {"cpu": '_Pragma("clang loop unroll(disable)")', "cuda": '_Pragma("unroll 1")'}
+"""Loops stay loops: rolled out they take a compiler many times as long."""
+
 OPTIONS = {
     "cpu": (("optimization_level", 1), ("cpu_compiler_flags", "-march=native")),
     "cuda": (),
 }
-"""Of Warp's compiler. What is left out of the first one's own takes ten times as long and gives slower
-code: it would write every kernel out where it is called."""
+"""Of Warp's compiler. What it would do by itself on a processor, write every function out where it is
+called, takes ten times as long and gives slower code."""
 
 
-class Program:
+class FleetProgram:
     """What runs a plan for many robots, and the arrays that all of them read.
 
     Args:
@@ -57,7 +58,7 @@ class Program:
         wp = warp()
         real = getattr(wp, dtype)
         robot = ROBOT.make(plan.size.by_name())
-        layout = Layout(plan.tick, {"robot": robot}, poison=poison)
+        layout = RobotLayout(plan.tick, {"robot": robot}, poison=poison)
         self._addresses: list[int] = []
         self._first = layout.integers.size
         lines = _lines(plan, arrays, self._address)
@@ -77,7 +78,7 @@ class Program:
             ]
         )
         kind = "cpu" if device.is_cpu else "cuda"
-        self.kernel = fleet_kernel(LOOP.sub(ROLLED[kind], text), dtype, OPTIONS[kind])
+        self.kernel = fleet_kernel(_for_compiler(text, kind), dtype, OPTIONS[kind])
         self.fixed = wp.array(layout.numbers, dtype=real, device=device)
         whole = np.concatenate([layout.integers, np.array(self._addresses, np.int64)])
         self.whole = wp.array(whole, dtype=wp.int64, device=device)
@@ -125,6 +126,14 @@ def _lines(plan: Plan, arrays: list[TaskArrays], address: Any) -> tuple[list[str
     return before, after
 
 
+def _for_compiler(text: str, kind: str) -> str:
+    """Say what a compiler shall leave as it is."""
+    text = LOOP.sub(rf"\1{ROLLED[kind]} \2", text)
+    if kind == "cuda":  # it writes functions out where they are called unless it is told not to
+        text = LAMBDA.sub(r"\1 __attribute__((noinline)) {", text)
+    return text
+
+
 def _row(array: str) -> str:
     return f"(real*)((char*){array}.data + i * (long long){array}.strides[0])"
 
@@ -132,5 +141,3 @@ def _row(array: str) -> str:
 @cache
 def _translated(dtype: str) -> tuple[str, str]:
     return translate(robot_tick, constants_of(dtype))
-
-

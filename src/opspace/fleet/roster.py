@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from opspace.errors import InputError, unknown_name
-from opspace.fleet.activations import Activations
+from opspace.fleet.fleet_activations import Activations
 from opspace.fleet.fleet_member import FleetMember, FleetPlace
 from opspace.kernels.columns import VARIABLE_SIZE
 from opspace.stack.changes import Timing

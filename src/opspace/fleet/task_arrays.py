@@ -142,7 +142,8 @@ class TaskArrays:
         """
         mask = robots_of(robots, self._count)
         stiffness = self._checked(kp, self.kp, mask)
-        damping = 2.0 * np.sqrt(stiffness) if kv is None else self._checked(kv, self.kv, mask)
+        critical = 2.0 * np.sqrt(np.maximum(stiffness, 0.0))
+        damping = critical if kv is None else self._checked(kv, self.kv, mask)
         if (stiffness < 0.0).any() or (damping < 0.0).any():
             raise InputError(f"task {self.name!r}: gains must be at least 0")
         _write(self.kp, stiffness, mask)
