@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 INSTALLED := $(VENV)/.installed
 BENCH := .venv-bench
 
-.PHONY: help test lint docs wheel test-package test-lowest test-slow test-browser reproduce comparison bench constraints clean
+.PHONY: help test lint docs wheel test-package test-lowest test-slow test-search test-browser reproduce comparison bench constraints clean
 
 help:
 	@echo "make reproduce   the two experiments of the paper: tables and figures in results/"
@@ -15,6 +15,7 @@ help:
 	@echo "make test-package the default suite on the wheel, from the source distribution"
 	@echo "make test-lowest the default suite on the lowest versions that are allowed (PYTHON=python3.10)"
 	@echo "make test-slow   campaigns that take minutes"
+	@echo "make test-search the default suite with examples drawn anew, and ten times as many of the laws"
 	@echo "make test-browser the viewer in headless Chromium, which must be installed"
 	@echo "make comparison  run other methods on the show-piece; rewrites the tables in the documents"
 	@echo "make bench       time the tick beside other controllers, in an environment of its own"
@@ -71,7 +72,9 @@ test-lowest: $(INSTALLED)
 
 test-slow: $(INSTALLED)
 	$(BIN)/python -m pytest -m slow
-	OPSPACE_CAMPAIGN=1 $(BIN)/python -m pytest -n 2 tests/law tests/stack/test_programs.py tests/scenario/test_fuzz_at_run_time.py
+
+test-search: $(INSTALLED)
+	OPSPACE_CAMPAIGN=1 $(BIN)/python -m pytest -n 2 --hypothesis-profile=search
 
 test-browser: $(INSTALLED)
 	$(BIN)/python -m pytest -m browser

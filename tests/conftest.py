@@ -19,9 +19,11 @@ READABLE = (
 install_import_hook([f"opspace.law.{name}" for name in READABLE], f"{shapes.__name__}.check")
 
 settings.register_profile(
-    "opspace", deadline=None, suppress_health_check=[HealthCheck.too_slow], print_blob=True
+    "search", deadline=None, suppress_health_check=[HealthCheck.too_slow], print_blob=True
 )
-settings.load_profile("opspace")
+# The same sources get the same answer; what nobody has drawn yet is for `make test-search`.
+settings.register_profile("gate", settings.get_profile("search"), derandomize=True)
+settings.load_profile("gate")
 
 
 def pytest_configure(config):

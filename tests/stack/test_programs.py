@@ -142,7 +142,7 @@ def test_the_programs_do_overlap(bench):
     """What the two tests above draw from is not tame."""
     most = []
 
-    @settings(max_examples=20, database=None, derandomize=True)
+    @settings(max_examples=20, database=None)
     @given(steps=programs(0.002, 0.4))
     def play(steps):
         bound = StepBound()
