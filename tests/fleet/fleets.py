@@ -25,17 +25,18 @@ class Beside:
     Args:
         count: Number of robots.
         dtype: Of the fleet.
+        alone: Whether there are no controllers, which take most of the time.
         options: Of both.
     """
 
-    def __init__(self, count=COUNT, dtype="float64", make=tasks, **options):
+    def __init__(self, count=COUNT, dtype="float64", alone=False, make=tasks, **options):
         options = {"torque_limits": "priority", "blending": "idv", **options}
         robot = osc.load_robot("puma560")
         self.n, self.count, self.robot = robot.nv, count, robot
         stack, self.later = make(robot)
         self.fleet = osc.Fleet(robot, osc.Stack(stack), count, device="cpu", dtype=dtype, **options)
         self.stacks, self.controllers, self.others = [], [], []
-        for _ in range(count):
+        for _ in range(0 if alone else count):
             own = osc.load_robot("puma560")
             levels, later = make(own)
             self.stacks.append(osc.Stack(levels))
@@ -69,7 +70,9 @@ class Beside:
         tau, commands = self.step(t, Q, V)
         for i, command in enumerate(commands):
             scale = max(1.0, float(np.max(np.abs(command.tau))))
-            np.testing.assert_allclose(tau[i], command.tau, rtol=0, atol=1e-9 * scale)
+            # Where bounds contradict, their softness multiplies rounding by its inverse.
+            part = 1e-7 if osc.Status.LIMIT_LOST in command.status else 1e-9
+            np.testing.assert_allclose(tau[i], command.tau, rtol=0, atol=part * scale)
         assert self.fleet.status.numpy().tolist() == [int(c.status) for c in commands]
         for arrays in self.fleet:
             h, error = arrays.presence.numpy(), arrays.error.numpy()
@@ -80,5 +83,5 @@ class Beside:
                     np.testing.assert_allclose(error[i], task.error, rtol=0, atol=1e-10)
         for k, name in enumerate(self.fleet.limit_names):
             want = [c.limits.get(name, 0.0) for c in commands]
-            np.testing.assert_allclose(self.fleet.limits.numpy()[:, k], want, rtol=0, atol=1e-9)
+            np.testing.assert_allclose(self.fleet.limits.numpy()[:, k], want, rtol=0, atol=1e-7)
         return commands

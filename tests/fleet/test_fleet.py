@@ -10,7 +10,7 @@ pytest.importorskip("warp", reason="fleets run in Warp: pip install 'opspace[gpu
 
 
 def test_random_states_with_limits_and_singular_postures():
-    both = Beside(count=64).prepare()
+    both = Beside(count=16).prepare()
     rng = np.random.default_rng(1)
     seen = 0
     for k in range(12):
@@ -83,7 +83,7 @@ def test_targets_and_gains_of_each_robot():
 
 
 def test_a_robot_that_is_reset_begins_anew_and_no_other_robot_notices():
-    both, alone = Beside().prepare(), Beside().prepare()
+    both, alone = (Beside(alone=True).prepare() for _ in range(2))
     rng = np.random.default_rng(4)
     Q, V = both.states(rng, spread=0.4)
     others = np.array([0, 2, 4])
@@ -95,7 +95,7 @@ def test_a_robot_that_is_reset_begins_anew_and_no_other_robot_notices():
             both.fleet["posture"].set_gains(400.0, robots=[3])
         if k == 10:
             both.fleet.reset([1, 3])
-            fresh = Beside(count=1).prepare()
+            fresh = Beside(1, alone=True).prepare()
             fresh.fleet["posture"].set_gains(400.0)
         q = Q + 0.01 * k * V
         tau = both.fleet.step(0.005 * k, q, V).numpy().copy()
@@ -115,7 +115,7 @@ def test_a_robot_that_is_reset_begins_anew_and_no_other_robot_notices():
 
 
 def test_single_precision():
-    double, single = (Beside(count=400, dtype=d).prepare() for d in ("float64", "float32"))
+    double, single = (Beside(400, d, alone=True).prepare() for d in ("float64", "float32"))
     rng = np.random.default_rng(5)
     for spread in (0.5, 1.0, 3.0):
         Q, V = single.states(rng, spread)
@@ -134,7 +134,7 @@ def test_single_precision():
 
 def test_times_on_the_device_and_a_place_for_the_torques():
     wp = pytest.importorskip("warp")
-    both = Beside().prepare()
+    both = Beside(alone=True).prepare()
     Q, V = both.states(np.random.default_rng(6))
     both.fleet.remove("position", 1.0)
     both.fleet.step(0.0, Q, V)
@@ -151,7 +151,7 @@ def test_times_on_the_device_and_a_place_for_the_torques():
 
 def test_tensors_of_torch_are_not_copied():
     torch = pytest.importorskip("torch", reason="torch is not installed")
-    both = Beside().prepare()
+    both = Beside(alone=True).prepare()
     Q, V = both.states(np.random.default_rng(7))
     tau = torch.zeros(Q.shape, dtype=torch.float64)
     assert both.fleet.step(0.0, torch.from_numpy(Q), torch.from_numpy(V), tau) is tau
@@ -182,7 +182,7 @@ def test_what_a_fleet_cannot_do_is_refused_by_name(why):
 
 
 def test_wrong_input_is_refused_by_name():
-    both = Beside().prepare()
+    both = Beside(alone=True).prepare()
     fleet, (Q, V) = both.fleet, both.states(np.random.default_rng(8))
     with pytest.raises(osc.InputError, match=r"q must have shape \(6, 6\)"):
         fleet.step(0.0, Q[:3], V)
@@ -222,7 +222,7 @@ def test_wrong_input_is_refused_by_name():
 def test_nothing_is_read_before_it_is_written():
     from opspace.fleet.program import FleetProgram
 
-    clean, poisoned = Beside(count=64).prepare(), Beside(count=64).prepare()
+    clean, poisoned = Beside(64, alone=True).prepare(), Beside(64, alone=True).prepare()
     fleet, rng = poisoned.fleet, np.random.default_rng(9)
     Q, V = clean.states(rng)
     clean.fleet.step(0.0, Q, V), fleet.step(0.0, Q, V)
