@@ -29,6 +29,8 @@ if TYPE_CHECKING:
     from opspace.errors import ScenarioError as ScenarioError
     from opspace.errors import UnknownNameError as UnknownNameError
     from opspace.export.c_library import export_c as export_c
+    from opspace.fleet import Fleet as Fleet
+    from opspace.fleet import TaskArrays as TaskArrays
     from opspace.law import Activation as Activation
     from opspace.law import Buffer as Buffer
     from opspace.law import LawInfo as LawInfo
@@ -126,6 +128,7 @@ _NAMES = {
         "RobotStoppedError ScenarioError UnknownNameError"
     ),
     "opspace.export.c_library": "export_c",
+    "opspace.fleet": "Fleet TaskArrays",
     "opspace.law": (
         "Activation Buffer LawInfo Profile Ramp SigmaBuffer TaskSet intermediate_values task_torque"
     ),

@@ -350,7 +350,11 @@ def compare(
 @app.command(epilog="Example: opspace bench panda ur5 --core 0 --against results/bench/before.json")
 def bench(
     scenes: Annotated[
-        list[str] | None, typer.Argument(help="Names of scenes. [default: all]", metavar="SCENE")
+        list[str] | None,
+        typer.Argument(
+            help="Names of scenes; fleet times many robots in Warp. [default: all but fleet]",
+            metavar="SCENE",
+        ),
     ] = None,
     ticks: Annotated[int, typer.Option(help="Ticks of every subject; states of a batch.")] = 4000,
     core: Annotated[int | None, typer.Option(help="Stay on this core for single ticks.")] = None,
@@ -371,6 +375,11 @@ def bench(
     from opspace.plots.benchmark import benchmark_figure
 
     before = None if against is None else Benchmark.load(against)
+    if scenes and "fleet" in scenes:
+        _bench_fleet(out)
+        scenes = [name for name in scenes if name != "fleet"]
+        if not scenes:
+            return
 
     def announce(what: str) -> None:
         print(what, file=sys.stderr)
@@ -387,6 +396,22 @@ def bench(
         _print_table(*compare_runs(before, found))
     found.save(out / "bench.json")
     save(benchmark_figure(found.scenes), out / "bench.png")
+    print(f"results: {out}")
+
+
+def _bench_fleet(out: Path) -> None:
+    """Time fleets, and say where."""
+    from opspace.bench import FLEET_HEADS, fleet_steps
+
+    print("fleets compile their kernels first, some ten seconds each", file=sys.stderr)
+    rows = fleet_steps()
+    _print_table(FLEET_HEADS, rows)
+    print("one core of this machine's processor; no graphics card was measured")
+    out.mkdir(parents=True, exist_ok=True)
+    content = [dict(zip(FLEET_HEADS, row, strict=True)) for row in rows]
+    (out / "fleet.json").write_text(
+        json.dumps(content, indent=1, ensure_ascii=False) + "\n", "utf-8"
+    )
     print(f"results: {out}")
 
 

@@ -76,11 +76,16 @@ def programs_of(page):
 WITH_PROGRAMS = [
     page for page in PAGES if any(block.language == "python" for block in programs_of(page))
 ]
+EXTRAS = {"docs/how-to/fleet.md": ("gpu", "warp")}
+"""Pages that need an extra, and the package that it brings."""
 WITH_FILES = [page for page in PAGES if any(block.title for block in programs_of(page))]
 
 
 @pytest.mark.parametrize("page", sorted({*WITH_PROGRAMS, *WITH_FILES}), ids=name_of)
 def test_the_code_blocks_run_in_order(page, tmp_path):
+    if name_of(page) in EXTRAS:
+        extra, package = EXTRAS[name_of(page)]
+        pytest.importorskip(package, reason=f"{name_of(page)} needs pip install 'opspace[{extra}]'")
     done = run_blocks(programs_of(page), tmp_path)
     assert done.returncode == 0, done.stderr
 

@@ -8,9 +8,15 @@ import pytest
 
 EXAMPLES = sorted((Path(__file__).parents[2] / "examples").glob("*.py"))
 
+EXTRAS = {"13_many_robots": ("gpu", "warp")}
+"""Examples that need an extra, and the package that it brings."""
+
 
 @pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
 def test_an_example_runs(path):
+    if path.stem in EXTRAS:
+        extra, package = EXTRAS[path.stem]
+        pytest.importorskip(package, reason=f"{path.name} needs pip install 'opspace[{extra}]'")
     done = subprocess.run(
         [sys.executable, "-W", "error", str(path)],
         capture_output=True,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
@@ -62,7 +62,7 @@ class Batch:
         self.members = members
         self.threads = threads
         self.robot = robot
-        self._plans = [planned(members, _axes(model, robot.nq)) for _ in range(threads)]
+        self._plans = [planned(members, axes_of(model, robot.nq)) for _ in range(threads)]
 
     @property
     def plan(self) -> Plan:
@@ -103,7 +103,7 @@ class Batch:
         ramps = tuple(variable.ramp for variable in first.variables)
         first.go_on(first.heritage(before, known, first.variables, ramps), first.members)
         touches = [(one.task.memory, one.task.memory.row.copy()) for one in first.forces]
-        self._refresh(t)
+        refresh_apart(self._plans, self.robot, t)
         own = self._own_activations(Q, V, t)
         for memory, row in touches:  # an activation of the user's own may ask it
             memory.row[:] = row
@@ -133,15 +133,6 @@ class Batch:
             row[:] = np.nan_to_num(robot.gravity, nan=0.0, posinf=0.0, neginf=0.0)
         return found
 
-    def _refresh(self, t: float) -> None:
-        """Bring all plans up to date, without beginning for the tasks what they have not begun."""
-        tasks = [m.task for m in self.members if isinstance(m.task, TrackingTask)]
-        progress = [task.progress for task in tasks]
-        for plan in self._plans:
-            plan.refresh(self.robot, t)
-        for task, before in zip(tasks, progress, strict=True):
-            task.recall(before)
-
     def _own_activations(self, Q: np.ndarray, V: np.ndarray, t: float) -> np.ndarray:
         """Evaluate the activations that users gave to tasks, in Python, state by state."""
         own = np.ones((1, len(self.members)))
@@ -157,7 +148,8 @@ class Batch:
         return own
 
 
-def _axes(model: RigidModel, nq: int) -> MotionAxes:
+def axes_of(model: RigidModel, nq: int) -> MotionAxes:
+    """Make memory of its own for a robot that compiled code computes, at rest."""
     n = model.bodies.before.size
     return model.motion_axes(make_dynamics(model.bodies), np.zeros(nq), np.zeros(n))
 
@@ -179,6 +171,16 @@ def check_contacts(members: tuple[ContactMember, ...]) -> None:
                 f"contact {contact.name!r} ({type(contact).__name__}) is evaluated in Python, one "
                 "state at a time; a batch takes the contacts of the library only"
             )
+
+
+def refresh_apart(plans: Sequence[Plan], robot: AdapterBase, t: float) -> None:
+    """Bring plans of the same tasks up to date, without beginning for the tasks what they have not."""
+    tasks = [m.task for m in plans[0].members if isinstance(m.task, TrackingTask)]
+    progress = [task.progress for task in tasks]
+    for plan in plans:
+        plan.refresh(robot, t)
+    for task, before in zip(tasks, progress, strict=True):
+        task.recall(before)
 
 
 def cores() -> int:

@@ -11,7 +11,16 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from opspace.command import Command, Status
-from opspace.controller.batch import Batch, check_contacts, check_members, checked_states, cores
+from opspace.controller.batch import (
+    Batch,
+    axes_of,
+    check_contacts,
+    check_count,
+    check_members,
+    checked_states,
+    cores,
+    refresh_apart,
+)
 from opspace.controller.disturbance import DisturbanceObserver
 from opspace.controller.reference import ReferenceController
 from opspace.controller.stages import sum_of_hard_torques
@@ -320,18 +329,49 @@ class Controller(ReferenceController):
         blending = type(self._blending)
         return "" if blending is Blending else f"the blending {blending.__name__}"
 
-    def _batched(self, members: tuple[Member, ...], threads: int) -> Batch:
+    def plan_apart(self, members: tuple[Member, ...]) -> Plan:
+        """Lay tasks out for whoever computes many robots, apart from what the ticks here use.
+
+        Gains and targets are those of the moment; a task that holds what it finds is laid out with
+        what it would find now, and begins nothing.
+
+        Args:
+            members: The tasks, prepared by the stack.
+
+        Returns:
+            A plan with dynamics of its own.
+
+        Raises:
+            InputError: The robot is one of the user's own, something is Python, or there are too many
+                tasks.
+        """
+        robot, model = self._bodies_for("a fleet")
+        check_count(members, "a fleet")
+        plan = self._planned_apart(members, axes_of(model, robot.nq))
+        refresh_apart([plan], robot, 0.0)
+        return plan
+
+    def _bodies_for(self, who: str) -> tuple[AdapterBase, RigidModel]:
+        """Return the robot and its bodies, for somebody who computes them.
+
+        Raises:
+            InputError: There is something that nobody else can compute.
+        """
         robot = self.robot
         if own := self._not_compiled():
-            raise InputError(f"a batch cannot call {own}; step() can")
+            raise InputError(f"{who} cannot call {own}; step() can")
         if self._bodies is None and isinstance(robot, AdapterBase):
             self._bodies = robot.rigid_model()
         if self._bodies is None or not isinstance(robot, AdapterBase):
             raise InputError(
-                f"robot {robot.name!r} is not one of load_robot with hinges and slides; a batch "
+                f"robot {robot.name!r} is not one of load_robot with hinges and slides; {who} "
                 "needs its bodies"
             )
-        return Batch(robot, self._bodies, members, self._planned_apart, threads)
+        return robot, self._bodies
+
+    def _batched(self, members: tuple[Member, ...], threads: int) -> Batch:
+        robot, model = self._bodies_for("a batch")
+        return Batch(robot, model, members, self._planned_apart, threads)
 
     def _lay_out_ahead(self, to_come: Iterator[Outlook]) -> None:
         """Make the plans that will be needed, so that a tick has only to take one up."""

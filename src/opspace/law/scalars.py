@@ -440,7 +440,7 @@ UNLOAD = 0.1
 STALE_AFTER = 0.01
 """Without a new wrench for so long, what was measured last counts for nothing any more, s."""
 LEVER = 0.1
-"""Moment that counts like a force, per N: bounds of the integral of moment rows, m."""
+"""Moment that counts like a force, over that force, m."""
 LIGHTEST = 1e-9
 """A row that moves less than this mass in the inverse needs no damping of its own, 1/kg."""
 
@@ -608,8 +608,6 @@ ENTERING = 100.0 * MOST_WEIGHT
 """Weight in the metric of a contact on its way in."""
 HARDEST = 1e4
 """Where h/(1 − h) ends, with which that grows."""
-LEVER = 0.1
-"""Moment that counts like a force, over that force, m."""
 MAY_GIVE_UP = 0.01
 """Part of the weight that a removal may cost before the contact waits."""
 BARELY = 1e-6

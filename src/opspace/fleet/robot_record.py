@@ -1,0 +1,35 @@
+"""What one robot of a fleet is told and remembers, beside the arrays of its tick."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+
+from opspace.machine.field_table import Field, RecordTable
+
+_given = partial(Field, writer="caller")
+_whole = partial(Field, writer="caller", dtype=np.int64)
+
+ROBOT = RecordTable(
+    "Robot",
+    "One robot of a fleet; its tasks are in the order of the plan.",
+    _given(
+        "target", ("tasks", 7), "target position, then quaternion wxyz, of tasks of motion", "m"
+    ),
+    _given("velocity", ("tasks", 6), "its rate", "m/s, rad/s"),
+    _given("acceleration", ("tasks", 6), "the rate of that", "m/s², rad/s²"),
+    _given("joint_target", ("rows",), "target of tasks of joints", "rad, m"),
+    _given("joint_velocity", ("rows",), "its rate", "rad/s, m/s"),
+    _given("joint_acceleration", ("rows",), "the rate of that", "rad/s², m/s²"),
+    _whole("epoch", ("tasks",), "how often the task has begun, as its owner counts"),
+    _whole("seen", ("tasks",), "the same, as far as the robot has noticed"),
+    _whole("holds", ("tasks",), "whether the task holds what it finds when it begins"),
+    _whole("found", ("tasks",), "whether it has found that in this tick"),
+    _whole("remembers", ("tasks",), "whether the way round is known"),
+    _given("turn", ("tasks", 4), "which it was, as in ``TURN``"),
+    _given("before", ("tasks", 4), "target orientation of the tick before, quaternion wxyz"),
+    _given("joint_before", ("rows",), "joint targets of the tick before", "rad, m"),
+    _whole("status", (1,), "what happened, in the numbers of `opspace.Status`"),
+    _whole("solves", (1,), "hard torques that were computed"),
+)

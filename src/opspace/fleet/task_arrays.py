@@ -1,0 +1,219 @@
+"""What one task of a fleet is told and tells, robot by robot, as arrays."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from opspace.errors import InputError
+from opspace.fleet.warp_library import robots_of, warp
+from opspace.kernels.columns import (
+    GOAL_ACCELERATION,
+    GOAL_POSITION,
+    GOAL_ROTATION,
+    GOAL_VELOCITY,
+    JOINTS,
+    KIND,
+    ORIENTATION,
+    POSE,
+    QUANTITY,
+)
+from opspace.machine.field_table import Record
+from opspace.tasks import TrackingTask
+from opspace.tasks.rotation import quaternion_from_matrix
+from opspace.tasks.validation import numbers
+
+START = {ORIENTATION: 3}
+"""Where the target of a quantity begins among position and quaternion; others at the first."""
+
+
+class TaskArrays:
+    """One task of every robot of a fleet.
+
+    Every array is on the device of the fleet, has one row per robot and stays where it is, so that
+    a view of it in another library shows the present, too. What a task is told may be written at any
+    time between two steps: ``fleet["hand"].target.assign(goals)``.
+
+    Attributes:
+        name: Name of the task.
+        task: The task that it was made from; its own attributes are not looked at again.
+        target: Position (3,), quaternion wxyz (4,), both (7,), or joint positions (m,).
+        velocity: Its rate, (3,) or (6,) with the linear part first, or (m,); m/s, rad/s.
+        acceleration: The rate of that, m/s², rad/s².
+        kp: (m,) stiffness of every row, 1/s².
+        kv: (m,) damping of every row, 1/s.
+        activation: A factor of the task's presence in the stack, 0 to 1.
+        error: (m,) x_d − x at the last step, m, rad.
+        presence: h at the last step, activation included.
+    """
+
+    def __init__(self, task: TrackingTask, count: int, dtype: Any, device: Any) -> None:
+        self.task = task
+        self.name = task.name
+        self._count, self._dtype, self._device = count, dtype, device
+        self._size = 0
+        self._joints = False
+        self._start = 0
+        self._wishes = np.full(count, task.target is None)
+
+    def begin(self, tick: Record, i: int, rows: slice) -> None:
+        """Take what the task is told from the arrays of a plan in which it is the task ``i``."""
+        if self._size:
+            return
+        kind, number = tick.kind[i], tick.numbers[i]
+        m = rows.stop - rows.start
+        if kind[KIND] == JOINTS:
+            self._joints, self._size = True, m
+            goals = tick.goal[rows]
+            target, velocity, acceleration = goals[:, 0], goals[:, 1], goals[:, 2]
+        else:
+            place = number[GOAL_POSITION : GOAL_POSITION + 3]
+            turn = number[GOAL_ROTATION : GOAL_ROTATION + 9].reshape(3, 3)
+            quaternion = quaternion_from_matrix(turn if turn.any() else np.eye(3))
+            whole = np.concatenate([place, quaternion])
+            self._start = START.get(kind[QUANTITY], 0)
+            end = 7 if kind[QUANTITY] in (ORIENTATION, POSE) else 3
+            target, size = whole[self._start : end], 6 if kind[QUANTITY] == POSE else 3
+            self._size = target.size
+            velocity = number[GOAL_VELOCITY : GOAL_VELOCITY + size]
+            acceleration = number[GOAL_ACCELERATION : GOAL_ACCELERATION + size]
+        self.target, self.velocity, self.acceleration = map(
+            self._filled, (target, velocity, acceleration)
+        )
+        self.kp, self.kv = self._filled(tick.kp[rows]), self._filled(tick.kv[rows])
+        one = np.ones(())
+        self.activation, self.presence = self._filled(one), self._filled(one)
+        self.error = self._filled(np.zeros(m))
+        self._turn, self._before = self._filled(np.zeros(4)), self._filled(np.zeros(4))
+        self._joint_before = self._filled(np.zeros(m))
+        self._remembers, self._seen = self._filled(0), self._filled(-1)
+        self._epoch = self._filled(0)
+        self._holds = self._filled(0)
+        self._holds.assign(self._wishes.astype(np.int64))
+
+    def __repr__(self) -> str:
+        return f"TaskArrays({self.name!r} of {self._count} robots on {self._device})"
+
+    def begin_again(self, epoch: np.ndarray) -> None:
+        """Tell how often the task has begun with each robot, (count,)."""
+        self._epoch.assign(epoch)
+
+    def set_target(
+        self,
+        value: ArrayLike,
+        velocity: ArrayLike | None = None,
+        acceleration: ArrayLike | None = None,
+        robots: Any = None,
+    ) -> None:
+        """Set targets of some robots from Python; they hold nothing any more.
+
+        Args:
+            value: One target in the form that the task takes, or rows of ``target``.
+            velocity: Desired velocity; None is zero.
+            acceleration: Desired acceleration; None is zero.
+            robots: None for all, a mask, or their numbers.
+
+        Raises:
+            InputError: A value of another shape, not finite or not a rotation.
+        """
+        mask = robots_of(robots, self._count)
+        rows = self._rows(value, int(mask.sum()))
+        told = [(self.target, rows)]
+        for array, given in ((self.velocity, velocity), (self.acceleration, acceleration)):
+            told.append((array, self._checked(0.0 if given is None else given, array, mask)))
+        for array, row in told:
+            _write(array, row, mask)
+        self._wishes &= ~mask
+        self._holds.assign(self._wishes.astype(np.int64))
+
+    def set_gains(self, kp: ArrayLike, kv: ArrayLike | None = None, robots: Any = None) -> None:
+        """Set gains of some robots from Python.
+
+        Args:
+            kp: Stiffness, for all rows or one each, 1/s².
+            kv: Damping, 1/s; None is critical, 2 √kp.
+            robots: None for all, a mask, or their numbers.
+
+        Raises:
+            InputError: A gain below 0, not finite or of another shape.
+        """
+        mask = robots_of(robots, self._count)
+        stiffness = self._checked(kp, self.kp, mask)
+        critical = 2.0 * np.sqrt(np.maximum(stiffness, 0.0))
+        damping = critical if kv is None else self._checked(kv, self.kv, mask)
+        if (stiffness < 0.0).any() or (damping < 0.0).any():
+            raise InputError(f"task {self.name!r}: gains must be at least 0")
+        _write(self.kp, stiffness, mask)
+        _write(self.kv, damping, mask)
+
+    def places(self, i: int, rows: slice) -> Iterator[tuple[str, Any, str]]:
+        """List the arrays, which way each goes, and where it is in the memory of one robot's tick."""
+        first = rows.start
+        for name in ("target", "velocity", "acceleration"):
+            width = 7 if name == "target" else 6
+            start = self._start if name == "target" else 0
+            place = f"robot.{name}_.p + {i * width + start}"
+            if self._joints:
+                place = f"robot.joint_{name}_.p + {first}"
+            way = "in, out where found" if name == "target" else "in"
+            yield way, getattr(self, name), f"({place})"
+        yield "in", self.kp, f"(work.kp_.p + {first})"
+        yield "in", self.kv, f"(work.kv_.p + {first})"
+        yield "in", self.activation, f"(work.own_.p + {i})"
+        yield "out", self.presence, f"(work.h_.p + {i})"
+        yield "out", self.error, f"(work.error_.p + {first})"
+        yield "in", self._epoch, f"(robot.epoch_.p + {i})"
+        yield "in", self._holds, f"(robot.holds_.p + {i})"
+        yield "in, out", self._seen, f"(robot.seen_.p + {i})"
+        yield "in, out", self._remembers, f"(robot.remembers_.p + {i})"
+        yield "in, out", self._turn, f"(robot.turn_.p + {4 * i})"
+        if self._joints:
+            yield "in, out", self._joint_before, f"(robot.joint_before_.p + {first})"
+        else:
+            yield "in, out", self._before, f"(robot.before_.p + {4 * i})"
+
+    def _filled(self, row: ArrayLike) -> Any:
+        """Make an array with the same row for every robot."""
+        wp = warp()
+        found = np.asarray(row)
+        whole = np.broadcast_to(found, (self._count, *found.shape))
+        dtype = wp.int64 if found.dtype.kind == "i" else self._dtype
+        return wp.array(whole, dtype=dtype, device=self._device)
+
+    def _rows(self, value: ArrayLike, count: int) -> np.ndarray:
+        found = numbers(value, f"task {self.name!r}: target")
+        if found.shape == (count, self._size) and found.shape != (3, 3):
+            turn = found[:, 3 - self._start :] if self._size != 3 and not self._joints else None
+            lengths = np.ones(1) if turn is None else np.linalg.norm(turn, axis=1)
+            if not np.isfinite(found).all() or not (abs(lengths - 1.0) < 1e-3).all():
+                raise InputError(
+                    f"task {self.name!r}: targets must be finite, quaternions of length 1"
+                )
+            return found
+        goal = self.task._check_value(value, f"task {self.name!r}: target")
+        if self._joints or goal.ndim == 1:
+            return np.broadcast_to(goal, (count, self._size))
+        turn = np.array(quaternion_from_matrix(goal[:3, :3]))
+        row = np.concatenate([goal[:3, 3], turn]) if self._size == 7 else turn
+        return np.broadcast_to(row, (count, self._size))
+
+    def _checked(self, value: ArrayLike, array: Any, mask: np.ndarray) -> np.ndarray:
+        what = f"task {self.name!r}: {value!r}"
+        found = numbers(value, what)
+        shape = (int(mask.sum()), *array.shape[1:])
+        try:
+            found = np.broadcast_to(found, shape)
+        except ValueError:
+            raise InputError(f"{what} has shape {found.shape}, not {shape}") from None
+        if not np.isfinite(found).all():
+            raise InputError(f"{what} must be finite")
+        return found
+
+
+def _write(array: Any, rows: np.ndarray, mask: np.ndarray) -> None:
+    whole = array.numpy().copy()
+    whole[mask] = rows
+    array.assign(whole)

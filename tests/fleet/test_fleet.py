@@ -1,0 +1,235 @@
+"""Every robot of a fleet does what a controller of its own would do."""
+
+import numpy as np
+import pytest
+
+import opspace as osc
+from tests.fleet.fleets import Beside
+
+pytest.importorskip("warp", reason="fleets run in Warp: pip install 'opspace[gpu]'")
+
+
+def test_random_states_with_limits_and_singular_postures():
+    both = Beside(count=16).prepare()
+    rng = np.random.default_rng(1)
+    seen = 0
+    for k in range(12):
+        Q, V = both.states(rng, spread=0.3 * (k + 1), speed=2.0)
+        for command in both.assert_same(0.001 * k, Q, V):
+            seen |= int(command.status)
+    wanted = osc.Status.DIRECTION_OFF | osc.Status.FILTERED | osc.Status.TORQUE_SCALED
+    assert wanted in osc.Status(seen)
+
+
+def test_transitions_of_some_robots():
+    both = Beside().prepare()
+    rng = np.random.default_rng(2)
+    Q, V = both.states(rng, spread=0.4)
+    program = {
+        2: lambda x, some: x.swap("position", "orientation", 0.1, **some([0, 2, 4])),
+        5: lambda x, some: x.move("position", 2, 0.05, **some([1, 3])),
+        8: lambda x, some: x.remove("orientation", 0.04, **some([1, 4, 5])),
+        12: lambda x, some: x.insert("orientation", 1, 0.06, **some([5])),
+        20: lambda x, some: x.swap("position", "orientation", 0.0, **some([2])),
+    }
+    for k in range(36):
+        if k == 3:
+            both.fleet.insert("elbow", 0, 0.08, profile="cubic", robots=[0, 1])
+            for i in (0, 1):
+                both.stacks[i].insert(both.others[i], 0, 0.08, profile="cubic")
+        if k in program:
+            program[k](both.fleet, lambda robots: {"robots": robots})
+            for i, stack in enumerate(both.stacks):
+                for_one = Only(stack, i)
+                program[k](for_one, lambda robots: {"robots": robots})
+        both.assert_same(0.005 * k, Q + 0.005 * k * V, V)
+
+
+class Only:
+    """The stack of one robot, which does what a fleet is asked to do with it."""
+
+    def __init__(self, stack, i):
+        self._stack, self._i = stack, i
+
+    def __getattr__(self, name):
+        def ask(*given, robots):
+            if self._i in robots:
+                task = self._stack[given[0]] if name == "insert" else given[0]
+                getattr(self._stack, name)(task, *given[1:])
+
+        return ask
+
+
+def test_targets_and_gains_of_each_robot():
+    both = Beside().prepare()
+    rng = np.random.default_rng(3)
+    for k in range(6):
+        goals = [0.4, 0.1, 0.3] + rng.uniform(-0.2, 0.2, (both.count, 3))
+        turns = rng.normal(size=(both.count, 4))
+        turns /= np.linalg.norm(turns, axis=1, keepdims=True)
+        rate, kp = rng.uniform(-1, 1, (both.count, 3)), rng.uniform(10, 300, (both.count, 3))
+        position, orientation = both.fleet["position"], both.fleet["orientation"]
+        position.target.assign(goals)
+        position.set_gains(kp)
+        orientation.set_target(turns[::2], velocity=rate[::2], robots=[0, 2, 4])
+        orientation.activation.assign(np.linspace(0, 1, both.count))
+        for i, stack in enumerate(both.stacks):
+            stack["position"].target, stack["position"].kp = goals[i], kp[i]
+            stack["position"].kv = 2 * np.sqrt(kp[i])
+            if i % 2 == 0:
+                stack["orientation"].set_target(turns[i], rate[i])
+            stack["orientation"].activation = lambda robot, t, h=i / (both.count - 1): h
+        both.assert_same(0.001 * k, *both.states(rng))
+
+
+def test_a_robot_that_is_reset_begins_anew_and_no_other_robot_notices():
+    both, alone = (Beside(alone=True).prepare() for _ in range(2))
+    rng = np.random.default_rng(4)
+    Q, V = both.states(rng, spread=0.4)
+    others = np.array([0, 2, 4])
+    for k in range(24):
+        if k == 4:
+            both.fleet.swap("position", "orientation", 0.05, robots=[1, 5])
+            both.fleet.remove("posture", 0.02, robots=[3])
+            both.fleet["position"].set_target([0.2, 0.3, 0.4], robots=[1])
+            both.fleet["posture"].set_gains(400.0, robots=[3])
+        if k == 10:
+            both.fleet.reset([1, 3])
+            fresh = Beside(1, alone=True).prepare()
+            fresh.fleet["posture"].set_gains(400.0)
+        q = Q + 0.01 * k * V
+        tau = both.fleet.step(0.005 * k, q, V).numpy().copy()
+        if k == 20:  # numbers that are none stay with their robot
+            q = q.copy()
+            q[3, 2] = np.nan
+            both.fleet["orientation"].set_target(np.zeros((1, 4)) + [1, 0, 0, 0], robots=[5])
+            tau = both.fleet.step(0.005 * k, q, V).numpy().copy()
+            assert both.fleet.status.numpy()[3] == int(osc.Status.FAULT)
+            assert np.isfinite(tau).all()
+            q = Q + 0.01 * k * V
+        want = alone.fleet.step(0.005 * k, q, V).numpy()
+        assert (tau[others] == want[others]).all()
+        if 10 <= k < 20:
+            one = fresh.fleet.step(0.005 * k, q[3:4], V[3:4]).numpy()
+            np.testing.assert_array_equal(tau[3], one[0])
+
+
+def test_single_precision():
+    double, single = (Beside(400, d, alone=True).prepare() for d in ("float64", "float32"))
+    rng = np.random.default_rng(5)
+    for spread in (0.5, 1.0, 3.0):
+        Q, V = single.states(rng, spread)
+        want = double.fleet.step(0.0, Q.astype(float), V.astype(float)).numpy()
+        tau = single.fleet.step(0.0, Q, V).numpy()
+        assert np.isfinite(tau).all()
+        assert (np.abs(tau) <= single.robot.torque_limit.astype(np.float32)).all()
+        # Where bounds contradict each other their softness decides, which digits limit.
+        kept = double.fleet.status.numpy() & int(osc.Status.LIMIT_LOST) == 0
+        error = np.abs(tau - want).max(axis=1)[kept] / np.abs(want).max(axis=1)[kept]
+        assert np.quantile(error, 0.99) < 1e-5
+        assert error.max() < 1e-3
+        double.fleet.reset()
+        single.fleet.reset()
+
+
+def test_times_on_the_device_and_a_place_for_the_torques():
+    wp = pytest.importorskip("warp")
+    both = Beside(alone=True).prepare()
+    Q, V = both.states(np.random.default_rng(6))
+    both.fleet.remove("position", 1.0)
+    both.fleet.step(0.0, Q, V)
+    want = [
+        both.fleet.step(t, Q, V).numpy()[i].copy() for i, t in enumerate(np.linspace(0.1, 0.6, 6))
+    ]
+    wide = np.zeros((both.count, both.n + 3))
+    into = wide[:, 1 : 1 + both.n]
+    times = wp.array(np.linspace(0.1, 0.6, 6), dtype=wp.float64, device="cpu")
+    assert both.fleet.step(times, wp.array(Q, device="cpu"), V, into) is into
+    np.testing.assert_array_equal(into, want)
+    assert (wide[:, 0] == 0.0).all()
+
+
+def test_tensors_of_torch_are_not_copied():
+    torch = pytest.importorskip("torch", reason="torch is not installed")
+    both = Beside(alone=True).prepare()
+    Q, V = both.states(np.random.default_rng(7))
+    tau = torch.zeros(Q.shape, dtype=torch.float64)
+    assert both.fleet.step(0.0, torch.from_numpy(Q), torch.from_numpy(V), tau) is tau
+    np.testing.assert_array_equal(tau.numpy(), both.fleet.step(0.0, Q, V).numpy())
+
+
+REFUSED = {
+    "needs a wrench": lambda: osc.ForceTask(name="press"),
+    "reference in time": lambda: osc.PositionTask(target=osc.Circle([0.4, 0.0, 0.3], 0.1, 2.0)),
+    "activation of its own": lambda: with_activation(osc.PositionTask()),
+    "integral action": lambda: osc.PositionTask(ki=10.0),
+    "on a way": lambda: osc.PositionTask(max_speed=0.3, max_acceleration=1.0),
+    "observer_time": lambda: osc.JointLimits(observer_time=0.005),
+}
+
+
+def with_activation(task):
+    task.activation = osc.JointBuffer("joint2", -0.2, 0.9)
+    return task
+
+
+@pytest.mark.parametrize("why", REFUSED)
+def test_what_a_fleet_cannot_do_is_refused_by_name(why):
+    options = {"torque_limits": "priority"}
+    stack = osc.Stack([REFUSED[why](), osc.PostureTask()])
+    with pytest.raises(osc.InputError, match=why):
+        osc.Fleet(osc.load_robot("puma560"), stack, 2, device="cpu", **options)
+
+
+def test_wrong_input_is_refused_by_name():
+    both = Beside(alone=True).prepare()
+    fleet, (Q, V) = both.fleet, both.states(np.random.default_rng(8))
+    with pytest.raises(osc.InputError, match=r"q must have shape \(6, 6\)"):
+        fleet.step(0.0, Q[:3], V)
+    with pytest.raises(osc.InputError, match="v must have numbers of float64"):
+        fleet.step(0.0, Q, V.astype(np.float32))
+    with pytest.raises(osc.InputError, match="time"):
+        fleet.step(np.nan, Q, V)
+    with pytest.raises(osc.InputError, match="0 to 5"):
+        fleet.remove("position", robots=[6])
+    with pytest.raises(osc.InputError, match="mask"):
+        fleet.remove("position", robots=[True])
+    with pytest.raises(osc.UnknownNameError, match="positoin"):
+        fleet.remove("positoin")
+    with pytest.raises(osc.UnknownNameError, match="'hand'"):
+        fleet["hand"]
+    with pytest.raises(osc.InputError, match="no task 'elbow'"):
+        fleet.move("elbow", 0)
+    with pytest.raises(osc.InputError, match="at level 0"):
+        fleet.insert("position", 2, robots=[3])
+    with pytest.raises(osc.InputError, match="twice"):
+        fleet.swap("position", "position")
+    with pytest.raises(osc.InputError, match="length 1"):
+        fleet["orientation"].set_target(np.zeros((6, 4)))
+    with pytest.raises(osc.InputError, match="finite"):
+        fleet["position"].set_target([np.nan, 0, 0])
+    with pytest.raises(osc.InputError, match="at least 0"):
+        fleet["position"].set_gains(-1.0)
+    with pytest.raises(osc.UnknownNameError, match="dtype"):
+        osc.Fleet(both.robot, osc.Stack([osc.PostureTask()]), 1, dtype="float16", device="cpu")
+    with pytest.raises(osc.InputError, match="no device"):
+        osc.Fleet(both.robot, osc.Stack([osc.PostureTask()]), 1, device="cuda:9")
+    with pytest.raises(osc.InputError, match="at least one robot"):
+        osc.Fleet(both.robot, osc.Stack([osc.PostureTask()]), 0, device="cpu")
+
+
+@pytest.mark.slow
+def test_nothing_is_read_before_it_is_written():
+    from opspace.fleet.program import FleetProgram
+
+    clean, poisoned = Beside(64, alone=True).prepare(), Beside(64, alone=True).prepare()
+    fleet, rng = poisoned.fleet, np.random.default_rng(9)
+    Q, V = clean.states(rng)
+    clean.fleet.step(0.0, Q, V), fleet.step(0.0, Q, V)
+    arrays = list(fleet)
+    plan = fleet._controller.plan_apart(fleet._roster.present)
+    fleet._program = FleetProgram(plan, arrays, fleet.dtype, fleet.device, poison=True)
+    for k in range(8):
+        Q, V = clean.states(rng, spread=0.4 * k, speed=2.0)
+        tau = fleet.step(0.001 * k, Q, V).numpy()
+        np.testing.assert_array_equal(tau, clean.fleet.step(0.001 * k, Q, V).numpy())
