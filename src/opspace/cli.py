@@ -251,7 +251,7 @@ def reproduce(
 
 
 def _reproduce_touch(which: Which, robot: str, out: Path) -> None:
-    from opspace.runs.forces import (
+    from opspace.runs.reproduce_forces import (
         draw_touches,
         measured,
         numbers_table,

@@ -141,7 +141,10 @@ def test_a_robot_file_that_does_not_parse_is_named(capsys, tmp_path, scenario, n
     [
         (["run", "singularty"], "did you mean 'singularity'"),
         (["run", "nowhere.yaml"], "nowhere.yaml"),
-        (["reproduce", "everything"], "'singularity', 'joint-limit', 'collisions', 'all'"),
+        (
+            ["reproduce", "everything"],
+            "'stiffness', 'collisions', 'humanoid', 'all'",
+        ),
         (["reproduce", "--robot", "ur55"], "did you mean 'ur5'"),
         (["check", "pumma"], "did you mean 'puma560'"),
         (["plot", "nowhere"], "nowhere"),

@@ -28,6 +28,7 @@ MAY_IMPORT = (
     "law",
     "command",
     "machine.jit",
+    "machine.system_calls",
     "robots.joint_kinds",
 )
 

@@ -14,6 +14,7 @@ from opspace.kernels.walk import begin, pass_on, walk
 from opspace.law import SigmaBuffer, TaskSet, blended_torque, corners
 from opspace.law.activation import PROFILES, Profile, Ramp
 from opspace.law.hierarchy import whiten
+from opspace.plan.bound_records import BOUNDS
 from opspace.plan.memory import Sizes, make_inertia
 from opspace.plan.records import SPACE
 from tests.budget import examples
@@ -55,7 +56,8 @@ def compiled_torque(L, tasks, blend, buffer):
         n=n, tasks=0, rows=row, slot_rows=row, slots=0, levels=len(ranks), variables=0, limits=0,
         corners=1,
     )  # fmt: skip
-    space = SPACE.make(size.by_name(), {"inertia": make_inertia(np.arange(n) - 1)})
+    parts = {"inertia": make_inertia(np.arange(n) - 1), "bounds": BOUNDS.make(size.by_name())}
+    space = SPACE.make(size.by_name(), parts)
     s = space.handle()
     levels = len(ranks) + 1
     begin(n, levels, s)

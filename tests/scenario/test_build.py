@@ -57,7 +57,7 @@ def test_the_schema_has_the_defaults_of_what_is_built(entry, built):
     parts = built if isinstance(built, tuple) else (built,)
     wanted = {key: value for part in parts for key, value in defaults(part).items()}
     given_ = entry_defaults(entry)
-    for of_the_stack in ("target", "present"):
+    for of_the_stack in ("target", "present", "activation", "give_way"):
         given_.pop(of_the_stack, None)
     assert given_
     for key, value in given_.items():
@@ -75,7 +75,9 @@ def test_every_profile_of_the_law_can_be_written():
 
 def test_a_scenario_that_uses_everything_is_built_and_steps():
     built = build(scenario_from(parse(EVERYTHING).data, ["plant.torque_limits=true"]))
-    command = built.controller.step(0.0, built.plant.q, built.plant.v)
+    command = built.controller.step(
+        0.0, built.plant.q, built.plant.v, wrenches=built.plant.wrenches()
+    )
     assert set(command.tasks) | {"rest"} == set(built.tasks) == set(built.scenario.tasks)
     assert np.isfinite(command.tau).all()
     assert built.plant.dt == built.scenario.dt

@@ -10,7 +10,7 @@ import pytest
 import opspace as osc
 from opspace.controller import ReferenceController
 from opspace.errors import ScenarioError
-from opspace.runs.forces import measured, run_ways, sweep_stiffness
+from opspace.runs.reproduce_forces import measured, run_ways, sweep_stiffness
 from opspace.scenario.build import build
 from opspace.scenario.load import load_scenario, scenario_from
 from opspace.sim import Surface

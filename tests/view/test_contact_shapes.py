@@ -108,7 +108,7 @@ def test_the_centre_of_mass_is_above_its_mark():
 
 def test_a_panel_tells_contacts_and_escapes_their_names():
     touching = (contact("a<b"), contact("gone", np.nan))
-    shown = Frame(0.0, NONE, NONE, NONE, (), (), {}, 0, touching)
+    shown = Frame(0.0, NONE, NONE, NONE, (), (), {}, 0, contacts=touching)
     text = panels.contacts(shown)
     assert "a&lt;b" in text
     assert "300 N" in text

@@ -27,7 +27,7 @@ OPERATORS: Mapping[type, str] = {
 FUNCTIONS = {
     "sqrt": "wp::sqrt", "sin": "wp::sin", "cos": "wp::cos", "tanh": "wp::tanh", "cosh": "wp::cosh",
     "atan2": "wp::atan2", "ceil": "wp::ceil", "pow": "wp::pow",
-    "isfinite": "wp::isfinite", "isnan": "wp::isnan",
+    "isfinite": "wp::isfinite", "isnan": "wp::isnan", "isinf": "wp::isinf",
 }  # fmt: skip
 """What `math` and powers are there."""
 

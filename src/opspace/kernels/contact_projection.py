@@ -19,16 +19,16 @@ from opspace.kernels.algebra import (
     solve_lower,
 )
 from opspace.kernels.compiled_scalars import entering_weight
-from opspace.kernels.contact_columns import (
+from opspace.kernels.contact_rows import close_contacts
+from opspace.kernels.inertia import acceleration_of, torque_of
+from opspace.kernels.projection import task_metric
+from opspace.kernels.stance_columns import (
     BASE_SIZE,
     EACH,
     NORMAL,
     PLACE_FIRST,
     PLACE_ROWS,
 )
-from opspace.kernels.contact_rows import close_contacts
-from opspace.kernels.inertia import acceleration_of, torque_of
-from opspace.kernels.projection import task_metric
 from opspace.law.scalars import (
     HARD,
     LEAST_REGULAR,

@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 from opspace.kernels.columns import LOCAL
-from opspace.kernels.contact_columns import (
+from opspace.kernels.corners import insert
+from opspace.kernels.inertia import whiten_rows
+from opspace.kernels.level import project, solve_level, take_alternative
+from opspace.kernels.motion import A, R, V, move_joints, place_point
+from opspace.kernels.stance_columns import (
     PLACE_BODY,
     PLACE_FIRST,
     PLACE_JOINT,
@@ -11,10 +15,6 @@ from opspace.kernels.contact_columns import (
     SOLE_ROWS,
     SURFACE,
 )
-from opspace.kernels.corners import insert
-from opspace.kernels.inertia import whiten_rows
-from opspace.kernels.level import project, solve_level, take_alternative
-from opspace.kernels.motion import A, R, V, move_joints, place_point
 from opspace.law.scalars import STILLING
 from opspace.machine.jit import jit
 

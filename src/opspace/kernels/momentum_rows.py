@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from opspace.kernels.columns import BODY, FIRST_ROW
-from opspace.kernels.contact_columns import BASE_SIZE
 from opspace.kernels.dynamics import MASS, MOMENT
+from opspace.kernels.stance_columns import BASE_SIZE
 from opspace.machine.jit import jit
 
 

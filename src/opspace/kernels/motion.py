@@ -15,7 +15,7 @@ from opspace.kernels.columns import (
     RELATIVE,
     SOURCE,
 )
-from opspace.kernels.contact_columns import BASE_SIZE
+from opspace.kernels.stance_columns import BASE_SIZE
 from opspace.machine.jit import jit
 
 # Columns of Tick.motion: rotation by rows, position, velocity, drift.

@@ -7,12 +7,12 @@ import math
 from opspace.command import Status
 from opspace.kernels.algebra import cholesky, solve_lower, solve_lower_transposed
 from opspace.kernels.columns import LIMIT_BOUND
-from opspace.kernels.contact_columns import BASE_SIZE, NORMAL, PLACE_FIRST, PLACE_ROWS
 from opspace.kernels.contact_projection import nearest_with_forces
 from opspace.kernels.contact_rows import take_rows
 from opspace.kernels.inertia import acceleration_of, torque_of
 from opspace.kernels.limit_columns import MARGIN, SIGN
 from opspace.kernels.limit_rows import find_bounds, find_excess, will_pass
+from opspace.kernels.stance_columns import BASE_SIZE, NORMAL, PLACE_FIRST, PLACE_ROWS
 from opspace.law.scalars import (
     BARELY,
     BROKEN,

@@ -6,7 +6,7 @@ from functools import partial
 
 import numpy as np
 
-from opspace.kernels.contact_columns import (
+from opspace.kernels.stance_columns import (
     BASE_SIZE,
     EACH,
     MOST_EDGES,
@@ -29,7 +29,7 @@ _ALL = f"n + {SOLE_ROWS} contacts"
 STANCE = RecordTable(
     "Stance",
     "What a robot touches, in the contacts' own axes, and the memory of the projection behind the law. "
-    "Its coordinates are changes of the motion, then of the forces; `opspace.kernels.contact_columns` "
+    "Its coordinates are changes of the motion, then of the forces; `opspace.kernels.stance_columns` "
     "names columns.",
     _refresh("count", (1,), "contacts that are there", dtype=_INT),
     _refresh("rows", (1,), "their rows", dtype=_INT),

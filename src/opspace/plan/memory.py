@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from opspace.kernels.contact_columns import SOLE_ROWS
+from opspace.kernels.stance_columns import SOLE_ROWS
 from opspace.machine.field_table import Block, Record
 from opspace.plan.bound_records import BOUNDS
 from opspace.plan.contact_records import no_stance

@@ -10,7 +10,7 @@ import numpy as np
 from opspace.command import ContactStatus
 from opspace.contacts import GroundContact, PointContact, SoleContact
 from opspace.kernels.columns import LOCAL, OFFSET
-from opspace.kernels.contact_columns import NORMAL, SURFACE
+from opspace.kernels.stance_columns import NORMAL, SURFACE
 from opspace.plan.contact_records import make_stance
 from opspace.robots.motion_axes import MotionAxes
 from opspace.robots.protocol import Robot
