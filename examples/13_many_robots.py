@@ -48,8 +48,9 @@ class Reach:
 rng = np.random.default_rng(0)
 arms = Reach(8)
 goals = np.array([0.4, 0.1, 0.3]) + rng.uniform(-0.1, 0.1, (8, 3))
+distances = []
 for k in range(20):
-    distance = arms.step(goals, np.linspace(50.0, 400.0, 8))
+    distances.append(arms.step(goals, np.linspace(50.0, 400.0, 8)))
     if k == 12:
-        arms.reset(distance > np.median(distance))
-print("distance of the hands [mm]:", np.round(1e3 * distance, 1))
+        arms.reset(distances[-1] > np.median(distances[-1]))
+print("distance of the hands [mm]:", np.round(1e3 * distances[-1], 1))

@@ -195,3 +195,17 @@ def torque_limits(run):
             (("what they give", 1.0),),
         ),
     ]
+
+
+def many_robots(run):
+    """Show how far the hands are from their targets, all of them."""
+    found = 1e3 * np.array(run.names["distances"])
+    t = 20e-3 * np.arange(len(found))
+    return [
+        Panel(
+            "eight arms, the slower half begins anew",
+            "distance of the hand [mm]",
+            [(f"arm {i}", t, found[:, i]) for i in range(found.shape[1])],
+            TIME,
+        )
+    ]

@@ -26,8 +26,11 @@ FROZEN = (
 
 BEGUN = ("kind", "numbers", "limit")
 """What the plan begins and a tick goes on with, each robot for itself."""
-EMPTY = ("U", "motors", "M", "bias", "placement", "velocity", "acceleration", "force", "inertia")
-"""What a tick does not write everywhere and reads as zero there."""
+EMPTY = (
+    *("U", "motors", "M", "bias", "placement", "velocity", "acceleration", "force", "inertia"),
+    *("count", "rows", "remembered", "spring"),
+)
+"""What a tick does not write everywhere and reads as zero there: a fleet stands on nothing."""
 
 
 class RobotLayout:

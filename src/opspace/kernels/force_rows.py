@@ -246,10 +246,11 @@ def _rub(work, rows, row, dt):
     for k in range(3):
         row[SLIDING + k] /= size
     if dt > 0.0:
-        (a, b, c), u = before, row[SLIDING : SLIDING + 3]
-        turn = b * u[2] - c * u[1], c * u[0] - a * u[2], a * u[1] - b * u[0]
+        a, b, c = before
+        x1, x2, x3 = row[SLIDING], row[SLIDING + 1], row[SLIDING + 2]
+        t1, t2, t3 = b * x3 - c * x2, c * x1 - a * x3, a * x2 - b * x1
         fx, fy, fz = row[ALONG], row[ALONG + 1], row[ALONG + 2]
-        cross_add(row, ALONG, turn[0], turn[1], turn[2], fx, fy, fz)
+        cross_add(row, ALONG, t1, t2, t3, fx, fy, fz)
     part = lag(dt, FRICTION_FILTER)
     for k in range(3):
         now = _tangential(work, rows, row, WRENCH, k)

@@ -27,9 +27,9 @@ def momentum_task(work, i):
         # The column of the bias comes last.
         m0, m1, m2 = _entry(work, 0, a), _entry(work, 1, a), _entry(work, 2, a)
         e0, e1, e2 = c0 - x[9], c1 - x[10], c2 - x[11]
-        moved = (e1 * m2 - e2 * m1, e2 * m0 - e0 * m2, e0 * m1 - e1 * m0)
+        r0, r1, r2 = e1 * m2 - e2 * m1, e2 * m0 - e0 * m2, e0 * m1 - e1 * m0
         for row in range(3):
-            turned = -moved[row]
+            turned = -(r0 if row == 0 else r1 if row == 1 else r2)
             for c in range(3):
                 turned += x[3 * c + row] * _entry(work, 3 + c, a)
             if a < n:
