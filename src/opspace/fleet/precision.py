@@ -17,7 +17,6 @@ SINGLE: Mapping[str, float] = MappingProxyType(
         "EPSILON": 4e-7,
         "SOFT": 1e-6,
         "HARD": 1e-6,
-        "NO_STEP": 1e-15,
         "ROUNDING": 1e-6,
         "BROKEN": 1e-5,
         "GIVEN_WAY": 1e-6,

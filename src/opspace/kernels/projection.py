@@ -13,7 +13,6 @@ from opspace.law.scalars import (
     CLEANINGS,
     EAGER,
     HARD,
-    NO_STEP,
     ROUNDING,
     SHARE,
     SOFT,
@@ -104,11 +103,6 @@ def make_room(d, n, space):
     for a in range(n):
         size += x[a] * x[a]
     size = EAGER * math.sqrt(size)
-    if size < NO_STEP:
-        for a in range(n):
-            space.u[d + 1, a] = space.u[d, a]
-            space.torque[d + 1, a] = space.torque[d, a]
-        return 0.0
     for j in range(n):
         bounds.normal[j, 0] = space.part[j] / size
     for k in range(1, used):
@@ -123,7 +117,7 @@ def make_room(d, n, space):
     for i in range(2 * n + 1):
         bounds.softness[i], bounds.owner[i], bounds.size[i] = HARD, i, 1.0
     _clean(2 * n + 1, used, bounds)
-    s = min(max(bounds.y[0] / size, 0.0), 1.0)
+    s = bounds.y[0] / size
     for a in range(n):
         x[a] *= s
         for k in range(1, used):

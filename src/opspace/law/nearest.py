@@ -15,7 +15,6 @@ from opspace.law.scalars import (
     CLEANINGS,
     EAGER,
     HARD,
-    NO_STEP,
     ROUNDING,
     SHARE,
     SOFT,
@@ -189,14 +188,12 @@ def make_room(
         s in [0, 1] and z, (r,).
     """
     size = EAGER * float(np.linalg.norm(step))
-    if size < NO_STEP:
-        return 0.0, np.zeros(beside.shape[1])
     joints = np.column_stack([part / size, beside])
     first = np.eye(1, joints.shape[1])
     rows = np.concatenate([joints, -joints, first])
     bounds = np.concatenate([SHARE * (limit - torque), SHARE * (limit + torque), [size]])
     found, _ = nearest_within(2.0 * size * first[0], rows, bounds, np.full(bounds.size, HARD))
-    return min(max(float(found[0]) / size, 0.0), 1.0), found[1:]
+    return float(found[0] / size), found[1:]
 
 
 def nearest_acceleration(

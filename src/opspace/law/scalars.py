@@ -561,9 +561,6 @@ EAGER = 2.0
 """How much more a step counts that the motors cannot give in full than what makes room for it. With more
 it would be given in full more often, and the torque would change faster."""
 
-NO_STEP = 1e-100
-"""A step shorter than this is none: the squares of its parts would be zero."""
-
 
 def room_for(part: np.ndarray, torque: np.ndarray, limit: np.ndarray) -> float:
     """Largest s in [0, 1] with which every joint stays inside its share of what is left.
