@@ -8,13 +8,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from opspace.kernels.algebra import cholesky, singular_values
-from opspace.kernels.compiled_scalars import profile, ramp, slot_bit
+from opspace.kernels.compiled_scalars import profile, ramp
 from opspace.kernels.corners import sort_corners
-from opspace.kernels.walk import begin, pass_on, walk
+from opspace.kernels.walk import begin, pass_on, slot_bit, walk
 from opspace.law import SigmaBuffer, TaskSet, blended_torque, corners
 from opspace.law.activation import PROFILES, Profile, Ramp
 from opspace.law.hierarchy import whiten
-from opspace.plan.bound_records import BOUNDS
 from opspace.plan.memory import Sizes, make_inertia
 from opspace.plan.records import SPACE
 from tests.budget import examples
@@ -56,8 +55,7 @@ def compiled_torque(L, tasks, blend, buffer):
         n=n, tasks=0, rows=row, slot_rows=row, slots=0, levels=len(ranks), variables=0, limits=0,
         corners=1,
     )  # fmt: skip
-    parts = {"inertia": make_inertia(np.arange(n) - 1), "bounds": BOUNDS.make(size.by_name())}
-    space = SPACE.make(size.by_name(), parts)
+    space = SPACE.make(size.by_name(), {"inertia": make_inertia(np.arange(n) - 1)})
     s = space.handle()
     levels = len(ranks) + 1
     begin(n, levels, s)

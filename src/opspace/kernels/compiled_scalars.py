@@ -5,7 +5,6 @@ from __future__ import annotations
 from types import FunctionType
 from typing import Any
 
-from opspace.kernels import columns
 from opspace.law import scalars
 from opspace.machine.jit import jit
 
@@ -37,7 +36,6 @@ speed_scale = _COMPILED["speed_scale"]
 without_turns = _COMPILED["without_turns"]
 room_for = _COMPILED["room_for"]
 entering_weight = _COMPILED["entering_weight"]
-slot_bit = jit(columns.slot_bit)
 passed = _COMPILED["passed"]
 lag = _COMPILED["lag"]
 is_fresh = _COMPILED["is_fresh"]

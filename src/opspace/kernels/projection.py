@@ -5,19 +5,11 @@ from __future__ import annotations
 import math
 
 from opspace.kernels.algebra import cholesky, cholesky_row, solve_lower, solve_lower_transposed
-from opspace.kernels.compiled_scalars import level_weight, slot_bit
+from opspace.kernels.compiled_scalars import level_weight
 from opspace.kernels.distances import faster
-from opspace.kernels.inertia import acceleration_of, torque_of, unit_row, whiten, whitened_of
-from opspace.law.scalars import (
-    BROKEN,
-    CLEANINGS,
-    EAGER,
-    HARD,
-    ROUNDING,
-    SHARE,
-    SOFT,
-    UNBOUNDED,
-)
+from opspace.kernels.inertia import acceleration_of, unit_row, whiten, whitened_of
+from opspace.kernels.walk import slot_bit
+from opspace.law.scalars import BROKEN, CLEANINGS, HARD, ROUNDING, SOFT, UNBOUNDED
 from opspace.machine.jit import jit
 
 
@@ -86,62 +78,6 @@ def nearest_acceleration(inertia, acceleration, bounds, distances):
         count = _take_in(inertia, acceleration, count, n, bounds, distances)
         if count == before:
             break
-
-
-@jit
-def make_room(d, n, space):
-    """Give as much of a step as the motors can, with help from what it leaves free.
-
-    Reads what `opspace.kernels.walk.keep_inside` has put into x and part of `SPACE`, and Z and free of
-    depth d + 1; writes u and torque of depth d + 1. See `opspace.law.nearest.make_room`.
-
-    Returns:
-        s, the part of the step that is given.
-    """
-    x, bounds, used = space.x, space.bounds, min(1 + space.free[d + 1], n)
-    size = 0.0
-    for a in range(n):
-        size += x[a] * x[a]
-    size = EAGER * math.sqrt(size)
-    for j in range(n):
-        bounds.normal[j, 0] = space.part[j] / size
-    for k in range(1, used):
-        torque_of(space.inertia, space.Z[d + 1, k - 1], bounds.row)
-        for j in range(n):
-            bounds.normal[j, k] = bounds.row[j]
-    for j in range(n):
-        _two_ends(j, n, used, SHARE * space.limit[j], SHARE * space.torque[d, j], bounds)
-    for k in range(used):
-        bounds.normal[2 * n, k], bounds.z[k] = 0.0, 0.0
-    bounds.normal[2 * n, 0], bounds.bound[2 * n], bounds.z[0] = 1.0, size, 2.0 * size
-    for i in range(2 * n + 1):
-        bounds.softness[i], bounds.owner[i], bounds.size[i] = HARD, i, 1.0
-    _clean(2 * n + 1, used, bounds)
-    s = bounds.y[0] / size
-    for a in range(n):
-        x[a] *= s
-        for k in range(1, used):
-            x[a] += bounds.y[k] * space.Z[d + 1, k - 1, a]
-        space.u[d + 1, a] = space.u[d, a] + x[a]
-    torque_of(space.inertia, x, space.part)
-    for a in range(n):
-        space.torque[d + 1, a] = space.torque[d, a] + space.part[a]
-    return s
-
-
-@jit
-def _two_ends(j, n, used, limit, torque, bounds):
-    """Turn row j into unit normals at j and n + j, for both ends of a motor's limit."""
-    size = 0.0
-    for k in range(used):
-        size += bounds.normal[j, k] * bounds.normal[j, k]
-    size = math.sqrt(size)
-    bounded = size > 0.0 and limit < UNBOUNDED
-    for k in range(used):
-        along = bounds.normal[j, k] / size if bounded else 0.0
-        bounds.normal[j, k], bounds.normal[n + j, k] = along, -along
-    bounds.bound[j] = (limit - torque) / size if bounded else UNBOUNDED
-    bounds.bound[n + j] = (limit + torque) / size if bounded else UNBOUNDED
 
 
 @jit

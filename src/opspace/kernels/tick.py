@@ -31,7 +31,7 @@ from opspace.kernels.columns import (
     TASK_BIAS,
     WORLD,
 )
-from opspace.kernels.compiled_scalars import leaning, ramp, slot_bit
+from opspace.kernels.compiled_scalars import leaning, ramp
 from opspace.kernels.contact_rows import close_contacts, contact_corners, evaluate_contacts
 from opspace.kernels.corners import corners, insert, sort_corners
 from opspace.kernels.distances import measure_distances
@@ -50,7 +50,7 @@ from opspace.kernels.limit_columns import COMMAND, SIGN
 from opspace.kernels.limit_rows import begin_limits, insert_limits, keep_bounds
 from opspace.kernels.standing import stand
 from opspace.kernels.task_rows import evaluate_tasks
-from opspace.kernels.walk import begin, keep_inside, pass_on, walk
+from opspace.kernels.walk import begin, keep_inside, pass_on, slot_bit, walk
 from opspace.law.scalars import CHAINED, EXACT, NO_GROUP
 from opspace.law.scalars import SCALED as GIVEN_WAY
 from opspace.machine.jit import jit

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from opspace.kernels.compiled_scalars import room_for, slot_bit
+from opspace.kernels import columns
+from opspace.kernels.compiled_scalars import room_for
 from opspace.kernels.inertia import torque_of
 from opspace.kernels.level import project, solve_level, take_alternative
-from opspace.kernels.projection import make_room
 from opspace.machine.jit import jit
 
 # Columns of ``Space.cursor``: corners of a node, the next one, corners of its group, next alternative.
@@ -82,6 +82,9 @@ def walk(first, levels, n, slots, J, f, masks, weights, corners, rest, buffer, s
             d -= 1
 
 
+slot_bit = jit(columns.slot_bit)
+
+
 @jit
 def _enter(d, first, end, cursor, alternatives):
     cursor[d, FIRST], cursor[d, END], cursor[d, NEXT] = first, end, first
@@ -107,9 +110,6 @@ def _leaf(d, n, weights, rest, space, u):
         along = 0.0
         for a in range(n):
             along += Z[d, k, a] * rest[a]
-        if space.motors[0] != 0:
-            for a in range(n):
-                along -= Z[d, k, a] * U[d, a]  # what made room for the levels
         for a in range(n):
             x[a] += along * Z[d, k, a]
     if space.motors[0] != 0:
@@ -151,7 +151,7 @@ def _next_group(d, levels, n, slots, J, f, masks, weights, rest, buffer, space):
         pass_on(d, n, space)
         space.alternatives[d] = 1
         return
-    last = d + 1 == levels and rest[n] == 0.0 and space.motors[0] == 0
+    last = d + 1 == levels and rest[n] == 0.0
     project(d, count, n, J, f, space)
     heaviest = share > space.top[d]
     if heaviest:
@@ -191,7 +191,7 @@ def group_weight(d, weights, cursor):
 
 @jit
 def keep_inside(d, n, weight, space):
-    """Change what the level at depth ``d`` has just added to what the motors can give, N·m."""
+    """Scale what the level at depth ``d`` has just added, so that the motors can give it, N·m."""
     if space.motors[0] == 0:
         return
     u, torque, part, x = space.u, space.torque, space.part, space.x
@@ -199,13 +199,12 @@ def keep_inside(d, n, weight, space):
         x[a] = u[d + 1, a] - u[d, a]
     torque_of(space.inertia, x, part)
     scale = room_for(part, torque[d], space.limit)
-    if scale < 1.0:
-        scale = make_room(d, n, space)
-    else:
-        for a in range(n):
-            torque[d + 1, a] = torque[d, a] + part[a]
     space.got[d, 0] += weight * scale
     space.got[d, 1] += weight
+    for a in range(n):
+        torque[d + 1, a] = torque[d, a] + scale * part[a]
+        if scale < 1.0:
+            u[d + 1, a] = u[d, a] + scale * x[a]
 
 
 @jit

@@ -11,16 +11,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from opspace.law.hierarchy import Level, WhitenedTask
-from opspace.law.scalars import (
-    CLEANINGS,
-    EAGER,
-    HARD,
-    ROUNDING,
-    SHARE,
-    SOFT,
-    UNBOUNDED,
-    level_weight,
-)
+from opspace.law.scalars import CLEANINGS, HARD, ROUNDING, SOFT, UNBOUNDED, level_weight
 
 
 class Nearest(NamedTuple):
@@ -163,37 +154,6 @@ def nearest_within(
         x, multipliers = nearest_point(x, unit, bounds[there] / size[there], softness[there])
         taken[there] += multipliers * size[there]
     return x, taken
-
-
-def make_room(
-    step: Float[np.ndarray, " n"],
-    part: Float[np.ndarray, " n"],
-    beside: Float[np.ndarray, "n r"],
-    torque: Float[np.ndarray, " n"],
-    limit: Float[np.ndarray, " n"],
-) -> tuple[float, Float[np.ndarray, " r"]]:
-    """Give as much of a step as the motors can, with help from what the step leaves free.
-
-        min EAGER² ‖step‖² (2 − s)² + ‖z‖²,   s <= 1
-        −SHARE (limit + torque) <= s part + beside z <= SHARE (limit − torque)
-
-    Args:
-        step: (n,) û that a level adds, √J/s.
-        part: (n,) its torque, N·m.
-        beside: (n, r) torques of the directions that are free beside it.
-        torque: (n,) torque before it, inside the limits, N·m.
-        limit: (n,) largest torque of each joint, N·m.
-
-    Returns:
-        s in [0, 1] and z, (r,).
-    """
-    size = EAGER * float(np.linalg.norm(step))
-    joints = np.column_stack([part / size, beside])
-    first = np.eye(1, joints.shape[1])
-    rows = np.concatenate([joints, -joints, first])
-    bounds = np.concatenate([SHARE * (limit - torque), SHARE * (limit + torque), [size]])
-    found, _ = nearest_within(2.0 * size * first[0], rows, bounds, np.full(bounds.size, HARD))
-    return float(found[0] / size), found[1:]
 
 
 def nearest_acceleration(

@@ -557,11 +557,6 @@ NO_DISTANCE = 1e-3
 """Centres of balls that come closer than this are in each other; no distance of theirs is left, m."""
 
 
-EAGER = 2.0
-"""How much more a step counts that the motors cannot give in full than what makes room for it. With more
-it would be given in full more often, and the torque would change faster."""
-
-
 def room_for(part: np.ndarray, torque: np.ndarray, limit: np.ndarray) -> float:
     """Largest s in [0, 1] with which every joint stays inside its share of what is left.
 

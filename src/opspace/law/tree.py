@@ -12,7 +12,6 @@ from jaxtyping import Float
 
 from opspace.law.blending import Weighted
 from opspace.law.hierarchy import Level, Partial, WhitenedTask, solve_level, stack_rows, start
-from opspace.law.nearest import make_room
 from opspace.law.scalars import room_for
 from opspace.law.singular_directions import (
     Alternative,
@@ -56,21 +55,10 @@ class Motors(NamedTuple):
     start: Float[np.ndarray, " n"]
     limit: Float[np.ndarray, " n"]
 
-    def inside(
-        self, above: Float[np.ndarray, " n"], below: Partial
-    ) -> tuple[float, Float[np.ndarray, " n"]]:
-        """What they can give of the step from û ``above`` to ``below``, see `make_room`.
-
-        Returns:
-            Part of the step that is given, and û behind it, (n,).
-        """
-        torque = self.start + self.L @ above
-        step = below.u - above
-        part = self.L @ step
-        if room_for(part, torque, self.limit) == 1.0:
-            return 1.0, below.u
-        scale, beside = make_room(step, part, self.L @ below.Z, torque, self.limit)
-        return scale, above + scale * step + below.Z @ beside
+    def scale(self, above: Float[np.ndarray, " n"], below: Float[np.ndarray, " n"]) -> float:
+        """Part of the step from û ``above`` to ``below`` that they can give, see `room_for`."""
+        part = self.L @ (below - above)
+        return room_for(part, self.start + self.L @ above, self.limit)
 
 
 @dataclass
@@ -157,10 +145,10 @@ class Walk:
         self, level: Level, above: Partial, partial: Partial, share: float, motors: Motors
     ) -> Partial:
         """Scale what a level adds, so that the motors can give it."""
-        scale, u = motors.inside(above.u, partial)
+        scale = motors.scale(above.u, partial.u)
         total, weight = self.report.got.get(level.priority, (0.0, 0.0))
         self.report.got[level.priority] = total + share * scale, weight + share
-        return Partial(u, partial.Z)
+        return Partial(above.u + scale * (partial.u - above.u), partial.Z)
 
     def _moves(self, above: Partial) -> Float[np.ndarray, " n"]:
         return np.zeros_like(above.u) if self._motion is None else self._motion

@@ -103,8 +103,7 @@ def make_tick(
     kept = TICK.reported(sizes, block)
     limit = np.array(torque_limit)  # one that may be written, like all the others
     inertia = make_inertia(_before(axes))
-    bounds = BOUNDS.make(sizes)
-    space = {"inertia": inertia, "bounds": bounds, "limit": limit, **SPACE.reported(sizes, block)}
+    space = {"inertia": inertia, "limit": limit, **SPACE.reported(sizes, block)}
     given = {
         **{name: getattr(axes, name) for name in ("q", "v", "M", "bias", "axes", "placement")},
         "later_q": np.zeros(axes.q.size),
@@ -119,7 +118,7 @@ def make_tick(
         "dynamics": axes.dynamics,
         "later": axes.later,
         "later_inertia": make_inertia(_before(axes)),
-        "bounds": bounds,
+        "bounds": BOUNDS.make(sizes),
         "distances": DISTANCES.make(sizes),
         "stance": no_stance() if stance is None else stance,
     }

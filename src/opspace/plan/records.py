@@ -113,7 +113,6 @@ SPACE = RecordTable(
     _plan("first_kept", (_DEPTHS,), "row where that begins for each level", dtype=_INT),
     _work("motors", (1,), "whether torque limits are kept", dtype=_INT),
     _record("inertia", of=INERTIA),
-    _record("bounds", of=BOUNDS),
     _work("start", ("n",), "torque before the first level, within limits", "N·m"),
     _plan("limit", ("n",), "largest torque of each joint", "N·m", start=math.inf),
     _work("torque", (_DEPTHS, "n"), "torque so far", "N·m"),
