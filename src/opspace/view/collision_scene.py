@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
@@ -19,7 +18,7 @@ from opspace.tasks.obstacles import Obstacle, Placing
 from opspace.tasks.rotation import quaternion_from_matrix
 from opspace.view.distance_panel import spare
 from opspace.view.frame import Frame
-from opspace.view.handle import DRAG_PERIOD, STAYS
+from opspace.view.handle import DragHandle
 from opspace.view.panels import blend_rgb
 
 Placed = Callable[[str, tuple[float, ...]], None]
@@ -129,72 +128,28 @@ class _Body:
     def __init__(
         self, server: viser.ViserServer, obstacle: Obstacle, placed: Placed | None
     ) -> None:
-        mesh = _mesh(obstacle)
-        self._mesh = server.scene.add_mesh_simple(
-            f"/obstacles/{obstacle.name}",
-            vertices=np.asarray(mesh.vertices, dtype=np.float32),
-            faces=np.asarray(mesh.faces, dtype=np.uint32),
-            color=_OBSTACLE_COLOR,
-            opacity=0.55,
-            flat_shading=False,
-            visible=False,
-        )
-        self._dragging, self._released = False, -math.inf
-        self._handle: viser.TransformControlsHandle | None = None
+        path = f"/obstacles/{obstacle.name}"
+        self._mesh = _drawn(server, path, _mesh(obstacle), _OBSTACLE_COLOR, 0.55)
+        self._handle: DragHandle | None = None
         if placed is not None:
-            self._handle = self._add_handle(server, obstacle.name, placed)
+            self._handle = DragHandle(
+                server,
+                f"/obstacle-handles/{obstacle.name}",
+                ("position",),
+                lambda place: placed(obstacle.name, place["position"]),
+            )
 
     def show(self, placing: Placing | None, live: bool) -> None:
         """Put shape and handle where the obstacle is, or hide them where there is none."""
         self._mesh.visible = placing is not None
         if self._handle is not None:
-            self._handle.visible = live and placing is not None
+            self._handle.show(live and placing is not None)
         if placing is None:
             return
         self._mesh.position = placing.position
         self._mesh.wxyz = np.array(quaternion_from_matrix(placing.rotation))
-        if self._handle is None or self._dragging or time.monotonic() < self._released + STAYS:
-            return
-        self._handle.position = placing.position
-
-    def _add_handle(
-        self, server: viser.ViserServer, name: str, placed: Placed
-    ) -> viser.TransformControlsHandle:
-        handle = server.scene.add_transform_controls(
-            f"/obstacle-handles/{name}",
-            scale=0.16,
-            line_width=3.0,
-            disable_rotations=True,
-            depth_test=False,
-            visible=False,
-        )
-        sent = 0.0
-
-        @handle.on_drag_start
-        def _(event: Any) -> None:
-            del event
-            self._dragging = True
-
-        @handle.on_update
-        def _(event: Any) -> None:
-            nonlocal sent
-            del event
-            now = time.monotonic()
-            if self._dragging and now - sent >= DRAG_PERIOD:
-                sent = now
-                placed(name, _place(handle))
-
-        @handle.on_drag_end
-        def _(event: Any) -> None:
-            del event
-            self._dragging, self._released = False, time.monotonic()
-            placed(name, _place(handle))
-
-        return handle
-
-
-def _place(handle: viser.TransformControlsHandle) -> tuple[float, ...]:
-    return tuple(float(x) for x in handle.position)
+        if self._handle is not None:
+            self._handle.follow(placing.position)
 
 
 def _mesh(obstacle: Obstacle) -> trimesh.Trimesh:
@@ -232,12 +187,22 @@ def _capsule(
         turn = trimesh.geometry.align_vectors([0.0, 0.0, 1.0], last - first)
         mesh.apply_transform(turn)
     mesh.apply_translation(0.5 * (first + last))
+    return _drawn(server, name, mesh, _SHAPE_COLOR, 0.3)
+
+
+def _drawn(
+    server: viser.ViserServer,
+    name: str,
+    mesh: trimesh.Trimesh,
+    color: tuple[int, int, int],
+    opacity: float,
+) -> viser.MeshHandle:
     return server.scene.add_mesh_simple(
         name,
         vertices=np.asarray(mesh.vertices, dtype=np.float32),
         faces=np.asarray(mesh.faces, dtype=np.uint32),
-        color=_SHAPE_COLOR,
-        opacity=0.3,
+        color=color,
+        opacity=opacity,
         flat_shading=False,
         visible=False,
     )

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -12,9 +12,9 @@ import viser
 
 from opspace.robots.protocol import Robot
 from opspace.robots.visuals import visuals_of
-from opspace.tasks.rotation import exp_rotation, quaternion_from_matrix
+from opspace.tasks.rotation import exp_rotation
 from opspace.view.frame import Frame, LevelFrame, TaskFrame
-from opspace.view.handle import DRAG_PERIOD, STAYS
+from opspace.view.handle import DragHandle
 from opspace.view.panels import blend_rgb
 
 Dragged = Callable[[str, dict[str, tuple[float, ...]]], None]
@@ -133,27 +133,23 @@ class _Target:
         about: Mapping[str, Any],
         dragged: Dragged | None,
     ) -> None:
-        self._name, self._about = name, about
-        self._dragging, self._released = False, -math.inf
+        self._about = about
         self._ball = server.scene.add_icosphere(
             f"/target/{name}", radius=0.014, color=_TARGET_COLOR, visible=False
         )
-        self._handle: viser.TransformControlsHandle | None = None
+        self._handle: DragHandle | None = None
         if dragged is not None:
-            self._handle = self._add_handle(server, dragged)
+            led = partial(dragged, name)
+            self._handle = DragHandle(server, f"/handle/{name}", about["led_by"], led)
 
     def show(self, task: TaskFrame, robot: Robot, live: bool) -> None:
         """Put ball and handle where the task is wanted."""
         position, rotation = self._wanted(task, robot)
         self._ball.visible = task.present and "position" in self._about["led_by"]
         self._ball.position = position
-        if self._handle is None:
-            return
-        self._handle.visible = task.present and live
-        if self._dragging or time.monotonic() < self._released + STAYS:
-            return
-        self._handle.position = position
-        self._handle.wxyz = np.array(quaternion_from_matrix(rotation))
+        if self._handle is not None:
+            self._handle.show(task.present and live)
+            self._handle.follow(position, rotation)
 
     def _wanted(self, task: TaskFrame, robot: Robot) -> tuple[np.ndarray, np.ndarray]:
         """Return where the task is led, from where it is and how far it is off."""
@@ -174,51 +170,6 @@ class _Target:
         if "orientation" in led_by:
             rotation = exp_rotation(parts[-1]) @ rotation
         return position, rotation
-
-    def _add_handle(
-        self, server: viser.ViserServer, dragged: Dragged
-    ) -> viser.TransformControlsHandle:
-        led_by = self._about["led_by"]
-        handle = server.scene.add_transform_controls(
-            f"/handle/{self._name}",
-            scale=0.16,
-            line_width=3.0,
-            disable_axes="position" not in led_by,
-            disable_sliders="position" not in led_by,
-            disable_rotations="orientation" not in led_by,
-            depth_test=False,
-            visible=False,
-        )
-        sent = 0.0
-
-        @handle.on_drag_start
-        def _(event: Any) -> None:
-            del event
-            self._dragging = True
-
-        @handle.on_update
-        def _(event: Any) -> None:
-            nonlocal sent
-            del event
-            if not self._dragging:
-                return
-            now = time.monotonic()
-            if now - sent >= DRAG_PERIOD:
-                sent = now
-                self._send(handle, dragged)
-
-        @handle.on_drag_end
-        def _(event: Any) -> None:
-            del event
-            self._dragging, self._released = False, time.monotonic()
-            self._send(handle, dragged)
-
-        return handle
-
-    def _send(self, handle: viser.TransformControlsHandle, dragged: Dragged) -> None:
-        place = {"position": handle.position, "orientation": handle.wxyz}
-        goal = {what: tuple(float(x) for x in place[what]) for what in self._about["led_by"]}
-        dragged(self._name, goal)
 
 
 def _light(color: tuple[int, int, int]) -> np.ndarray:
