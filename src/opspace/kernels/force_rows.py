@@ -12,7 +12,6 @@ from opspace.kernels.columns import (
     KIND,
     PRESS,
     ROWS,
-    TOOL_AXES,
     TOUCH,
 )
 from opspace.kernels.compiled_scalars import (
@@ -25,7 +24,7 @@ from opspace.kernels.compiled_scalars import (
     passed,
 )
 from opspace.kernels.inertia import whiten_rows
-from opspace.kernels.motion import A, P, R, V, cross_add, measure, move_joints
+from opspace.kernels.motion import A, P, V, cross_add, measure, move_joints, selected
 from opspace.law.press_columns import (
     AHEAD,
     ALONG,
@@ -129,12 +128,7 @@ def _rows(work, i):
             work.J[row, a] = 0.0
         work.drift[row] = work.error[row] = 0.0
         for c in range(6):
-            factor = work.select[row, c]
-            if work.kind[i, TOOL_AXES] != 0:
-                factor = 0.0
-                base = 3 * (c // 3)
-                for axis in range(3):
-                    factor += work.select[row, base + axis] * x[R + 3 * (c - base) + axis]
+            factor = selected(work, i, row, c)
             axes[r, c] = factor
             if factor == 0.0:
                 continue

@@ -14,6 +14,7 @@ from opspace.kernels.columns import (
     OTHER_LOCAL,
     RELATIVE,
     SOURCE,
+    TOOL_AXES,
 )
 from opspace.kernels.stance_columns import BASE_SIZE
 from opspace.machine.jit import jit
@@ -151,6 +152,17 @@ def measure(work, i):
     place_frame(work, i, 1, kind[BODY], kind[JOINT], LOCAL, False)
     place_frame(work, i, 2, kind[OTHER_BODY], kind[OTHER_JOINT], OTHER_LOCAL, False)
     _relative(work)
+
+
+@jit
+def selected(work, i, row, c):
+    """Entry c of what a row of task i selects of a motion: S, or S Rᵀ for axes of the tool."""
+    if work.kind[i, TOOL_AXES] == 0:
+        return work.select[row, c]
+    x, base, factor = work.motion[0], 3 * (c // 3), 0.0
+    for axis in range(3):
+        factor += work.select[row, base + axis] * x[R + 3 * (c - base) + axis]
+    return factor
 
 
 @jit

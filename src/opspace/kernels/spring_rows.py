@@ -9,10 +9,9 @@ from opspace.kernels.columns import (
     GOAL_VELOCITY,
     JOINT,
     ROWS,
-    TOOL_AXES,
 )
 from opspace.kernels.inertia import whiten_rows
-from opspace.kernels.motion import R
+from opspace.kernels.motion import selected
 from opspace.law.scalars import LIGHTEST
 from opspace.machine.jit import jit
 
@@ -48,13 +47,7 @@ def add_spring(work, i, size):
 @jit
 def _wanted_rate(work, i, row, size):
     """Speed that the goal has along a row."""
-    number, x, total = work.numbers[i], work.motion[0], 0.0
+    number, total = work.numbers[i], 0.0
     for c in range(size):
-        factor = work.select[row, c]
-        if work.kind[i, TOOL_AXES] != 0:
-            factor = 0.0
-            base = 3 * (c // 3)
-            for axis in range(3):
-                factor += work.select[row, base + axis] * x[R + 3 * (c - base) + axis]
-        total += factor * number[GOAL_VELOCITY + c]
+        total += selected(work, i, row, c) * number[GOAL_VELOCITY + c]
     return total

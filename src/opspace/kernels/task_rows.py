@@ -23,7 +23,6 @@ from opspace.kernels.columns import (
     ROWS,
     SPEED_LIMITED,
     SPRING,
-    TOOL_AXES,
     TURN,
 )
 from opspace.kernels.compiled_scalars import (
@@ -33,7 +32,7 @@ from opspace.kernels.compiled_scalars import (
     without_turns,
 )
 from opspace.kernels.momentum_rows import momentum_task
-from opspace.kernels.motion import A, P, R, V, measure, move_joints
+from opspace.kernels.motion import A, P, R, V, measure, move_joints, selected
 from opspace.kernels.spring_rows import add_spring
 from opspace.law.scalars import SIGNS
 from opspace.machine.jit import jit
@@ -131,13 +130,7 @@ def _project(work, i, row, block, size, x, e):
         work.J[row, a] = 0.0
     error, drift, rate, ahead = 0.0, 0.0, 0.0, 0.0
     for c in range(size):
-        factor = work.select[row, c]
-        if work.kind[i, TOOL_AXES] != 0:
-            # S Rᵀ: the selected axes of the tool, as combinations of those of the world.
-            factor = 0.0
-            base = 3 * (c // 3)
-            for axis in range(3):
-                factor += work.select[row, base + axis] * x[R + 3 * (c - base) + axis]
+        factor = selected(work, i, row, c)
         if factor == 0.0:
             continue
         source = block + c
