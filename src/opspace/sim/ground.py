@@ -114,6 +114,9 @@ class Ground:
         for geom in spec.geoms:
             geom.contype = geom.conaffinity = 0
         spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
+        if self.boards:
+            # Boxes around the shapes of a body are made once; a board that moves leaves its own.
+            spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_MIDPHASE
         spec.option.impratio = STICKING
         own = self._own_floors()
         floor = Wall((0.0, 0.0, self.height), (0.0, 0.0, 1.0))
