@@ -241,7 +241,7 @@ def reproduce(
 
     wanted = EXPERIMENTS if which is Which.ALL else (which.value,)
     with ProgressBar() as progress:
-        done = reproduce(wanted, robot or "puma560", out, progress=progress)
+        done = reproduce(wanted, robot, out, progress=progress)
     for found in done:
         print(f"\n{found.experiment.name}: {found.experiment.title}")
         _print_table(*metrics_table({name: run.metrics for name, run in found.runs.items()}))

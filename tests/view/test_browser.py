@@ -167,6 +167,7 @@ def test_insert_swap_remove_and_drag(run, chromium):
     press(page, "Swap")
     until(lambda: len(asked(out)) == 2, "the swap was asked for")
     press(page, "Remove")
+    until(lambda: len(asked(out)) == 3, "the removal was asked for")
     until(lambda: math.isnan(activation(page, "elbow")), "the task was gone")
     assert [entry["kind"] for entry in asked(out)] == ["insert", "swap", "remove"]
 

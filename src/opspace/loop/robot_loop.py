@@ -510,4 +510,4 @@ class Loop:
 
 def _answered(request: RunRequest, reason: str) -> None:
     if reason:
-        log.warning("request %s of %s was refused: %s", request.kind, list(request.tasks), reason)
+        log.warning("request %s of %s was refused: %s", request.kind, request.about, reason)
