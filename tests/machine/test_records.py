@@ -16,8 +16,10 @@ from opspace.machine.jit import UNCOUNTED
 from opspace.plan.memory import Reported, Sizes, make_tick
 from opspace.plan.records import BOUNDS, INERTIA, SIZES, SPACE, TABLES, TICK
 from opspace.robots import load_robot
+from opspace.robots.motor_range import MotorRange
 
 DOCS = Path(__file__).parents[2] / "docs"
+MOTORS = MotorRange(np.ones(6), np.zeros(6))
 NUMBERS = {name: i for i, name in enumerate(SIZES, start=2)}
 by_table = pytest.mark.parametrize("table", TABLES, ids=lambda table: table.name)
 
@@ -130,7 +132,7 @@ def test_one_copy_keeps_all_that_is_reported_and_nothing_else(tasks, rows, more,
         variables=tasks + v, limits=limits, corners=2,
     )  # fmt: skip
     axes = load_robot("puma560").motion_axes()
-    tick, memory = make_tick(size, axes, np.ones(6), np.zeros(OPTION_SIZE))
+    tick, memory = make_tick(size, axes, MOTORS, np.zeros(OPTION_SIZE))
     memory[:] = np.arange(memory.size)
     found = Reported(size, memory.tobytes())
     kept = 0
@@ -148,10 +150,10 @@ def test_one_copy_keeps_all_that_is_reported_and_nothing_else(tasks, rows, more,
 def test_a_tick_shares_with_its_walk_and_its_robot():
     axes = load_robot("puma560").motion_axes()
     size = Sizes(6, *[1] * 8)
-    option, motors = np.zeros(OPTION_SIZE), np.ones(6)
-    tick, _ = make_tick(size, axes, motors, option)
+    option = np.zeros(OPTION_SIZE)
+    tick, _ = make_tick(size, axes, MOTORS, option)
     assert tick.torque_limit is tick.space.limit
-    assert not np.shares_memory(tick.torque_limit, motors)
+    assert not np.shares_memory(tick.torque_limit, MOTORS.limit)
     assert tick.inertia is tick.space.inertia
     assert tick.option is option
     for name in ("q", "v", "M", "bias", "axes", "placement", "bodies", "dynamics"):

@@ -179,7 +179,6 @@ CASES = {
         (("j2", "a", "b"), ("j3", "b", "c"))))),
     "weaker one way": Case(
         scene(motors='<motor joint="j1" ctrlrange="-90 60"/><motor joint="j2" ctrlrange="-50 50"/>'),
-        ("the motor of j1 gives -90 to 60 N·m; 60 N·m is taken as its limit in both directions",),
     ),
     "only pulls": Case(
         scene(motors='<motor joint="j1" ctrlrange="0 90"/><motor joint="j2"/>'),

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from opspace import Controller, InputError, ModelError, ModelWarning, PostureTask, Stack, load_robot
+from opspace.robots.motor_range import motor_range
 from opspace.runs.check import check_robot
 
 ARM = """<mujoco><compiler angle="radian"/><option>{option}</option><worldbody>
@@ -31,16 +32,16 @@ def arm(tmp_path):
 
 
 def given_at_most(path):
-    """Largest torque of each joint in both directions, by asking MuJoCo for far too much."""
+    """Least and largest torque of each joint, by asking MuJoCo for far too much."""
     model = mujoco.MjModel.from_xml_path(str(path))
     data = mujoco.MjData(model)
     found = []
-    for sign in (1.0, -1.0):
+    for sign in (-1.0, 1.0):
         mujoco.mj_resetData(model, data)
         data.ctrl[:] = sign * 1e6
         mujoco.mj_forward(model, data)
         found.append(np.array(data.qfrc_actuator))
-    return np.minimum(np.abs(found[0]), np.abs(found[1]))
+    return np.sort(found, axis=0)
 
 
 @pytest.mark.parametrize(
@@ -59,6 +60,10 @@ def given_at_most(path):
         {"motors": '<motor tendon="t" ctrlrange="-6 6"/>', "tendon": 'actuatorfrcrange="-4 4"'},
         {"motors": '<general joint="j1" gainprm="3" ctrlrange="-2 2"/>'},
         {"motors": '<motor joint="j1" ctrlrange="0 5"/><motor joint="j1" ctrlrange="-5 0"/>'},
+        {"motors": '<motor joint="j1" ctrlrange="-2 5"/>'},
+        {"motors": '<motor joint="j1" ctrlrange="-9 9" forcerange="-9 3" gear="-2"/>'},
+        {"motors": '<motor joint="j1" ctrlrange="-9 9"/>', "j1": 'actuatorfrcrange="-4 7"'},
+        {"motors": '<motor tendon="t" ctrlrange="-1 6"/>', "coef": "-3"},
         {
             "motors": '<motor joint="j1" ctrlrange="-6 6" forcerange="-9 9"/>',
             "option": '<flag clampctrl="disable"/>',
@@ -74,25 +79,28 @@ def given_at_most(path):
 def test_a_limit_is_what_the_actuators_give(arm, what):
     path = arm(**{**what, "motors": what["motors"] + OTHER})
     robot = load_robot(path)
+    given = given_at_most(path)
     if "disable" in what.get("option", ""):
-        assert robot.torque_limit[0] == given_at_most(path)[0]
-    else:
-        np.testing.assert_allclose(robot.torque_limit, given_at_most(path), rtol=1e-12)
+        assert robot.torque_limit[0] == given[1, 0]
+        return
+    np.testing.assert_allclose(robot.torque_limit, np.abs(given).min(axis=0), rtol=1e-12)
+    np.testing.assert_allclose(robot.torque_range, given, rtol=1e-12)
+    motors = motor_range(robot)
+    np.testing.assert_allclose([motors.least, motors.most], given, rtol=1e-12)
 
 
 def test_a_group_that_is_switched_off_gives_nothing(arm):
     motors = '<motor joint="j1" ctrlrange="-6 6"/><motor joint="j1" ctrlrange="-2 2" group="3"/>'
     path = arm(motors + OTHER)
     path.write_text(path.read_text().replace("<option>", '<option actuatorgroupdisable="3">'))
-    np.testing.assert_allclose(load_robot(path).torque_limit, given_at_most(path))
+    np.testing.assert_allclose(load_robot(path).torque_range, given_at_most(path))
     assert load_robot(path).torque_limit[0] == 6.0
 
 
 @pytest.mark.parametrize(
     ("motor", "limit", "words"),
     [
-        ('<motor joint="j1" ctrlrange="-2 5"/>', 2.0, "gives -2 to 5 N·m; 2 N·m is taken"),
-        ('<motor joint="j1" forcerange="-9 3" gear="-2"/>', 6.0, "gives -6 to 18 N·m; 6 N·m"),
+        ('<motor joint="j1" forcerange="-9 inf"/>', 9.0, "gives -9 to inf N·m; 9 N·m is taken"),
         ('<motor joint="j1" ctrlrange="0 5"/>', 0.0, "0 to 5 N·m: it cannot be driven both ways"),
         ('<motor joint="j1" forcerange="-9 0"/>', 0.0, "-9 to 0 N·m: it cannot be driven both"),
         ('<motor joint="j1" gear="0" ctrlrange="-1 1"/>', 0.0, "0 to 0 N·m: it cannot be driven"),

@@ -100,7 +100,8 @@ class AnotherProjection(Controller):
             return command
         wish = self._wish(self._plan, command)
         tau = wish.U @ (wish.U.T @ self.realised(wish)) + wish.balance
-        return command._replace(tau=np.clip(tau, -wish.room, wish.room))
+        middle = np.array(self._plan.tick.torque_middle)
+        return command._replace(tau=np.clip(tau, -wish.room, wish.room) + middle)
 
     def realised(self, wish: Wanted) -> np.ndarray:
         """Choose an acceleration, (n,) rad/s²."""
@@ -112,7 +113,7 @@ class AnotherProjection(Controller):
         keeps = bool(tick.option[KEEP_TORQUE] != 0.0)
         # A tick that has nothing to keep does not say what it wanted: it did it.
         kept = keeps or len(tick.distance) > 0 or (limits is not None and limits.law.bound)
-        wanted = np.array(tick.wanted_tau) if kept else command.tau
+        wanted = np.array(tick.wanted_tau) if kept else command.tau - np.array(tick.torque_middle)
         n = balance.size
         return Wanted(
             U,

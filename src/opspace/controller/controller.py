@@ -53,6 +53,7 @@ from opspace.plan.read_report import CompiledReport
 from opspace.robots.adapter import AdapterBase
 from opspace.robots.bodies import make_dynamics
 from opspace.robots.motion_axes import MotionAxes
+from opspace.robots.motor_range import motor_range
 from opspace.robots.rigid_model import RigidModel
 from opspace.stack import Blending, Member, Outlook, variables_of
 from opspace.tasks.obstacles import Placing
@@ -486,7 +487,7 @@ class Controller(ReferenceController):
             axes,
             self._scales,
             self.stack.limits,
-            self.robot.torque_limit,
+            motor_range(self.robot),
             self._options(),
             self._blending,
             self._collisions,

@@ -49,8 +49,10 @@ class Handover:
         Args:
             t: Time, s.
             tau: (n,) torque of the controller, N·m.
-            limit: (n,) what the motors give, N·m; what is mixed stays inside where both are.
-            added: (n,) what the robot adds to either, N·m, and the motors give as well.
+            limit: (n,) what the motors give to both sides of its middle, N·m; what is mixed stays
+                inside where both are.
+            added: (n,) what the robot adds to either, N·m, and the motors give as well; less the middle
+                of what they give.
 
         Returns:
             (n,) torque for the robot, N·m.

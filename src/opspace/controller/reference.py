@@ -25,6 +25,7 @@ from opspace.errors import InputError, unknown_name
 from opspace.law import Profile
 from opspace.plan.scales import DEFAULT_SINGULARITY, Scales, Singularity
 from opspace.robots.adapter import AdapterBase
+from opspace.robots.motor_range import motor_range
 from opspace.robots.payload import Payload
 from opspace.robots.protocol import Robot
 from opspace.stack import Blending, Member, Stack
@@ -336,7 +337,8 @@ class ReferenceController:
             return command._replace(tau=command.tau - added) if self._robot_adds else command
         if self._observer is not None:
             self._observer.forget_last()
-        tau = handover.torque(command.t, command.tau - added, self.robot.torque_limit, added)
+        limit, middle = motor_range(self.robot)
+        tau = handover.torque(command.t, command.tau - added, limit, added - middle)
         if handover.done:
             self._handover = None
             self._plain = self._needs_no_more()
@@ -427,6 +429,7 @@ class ReferenceController:
         """Compute the torque of these tasks for the robot's present state."""
         r = self.robot
         touching = self.stack.begin_contacts(t) if self._base else ()
+        motors = motor_range(r)
         given = Given(
             self._rules,
             t,
@@ -435,8 +438,9 @@ class ReferenceController:
             r.q,
             r.v,
             r.M,
-            r.bias,
-            r.torque_limit,
+            r.bias - motors.middle,
+            motors.limit,
+            motors.middle,
             base=self._base,
             contacts=touching,
         )
@@ -491,9 +495,10 @@ class ReferenceController:
         robot = self.robot
         held = robot.bias if self._last_torque is None else self._last_torque
         tau = held - self.damping * robot.M.diagonal() * robot.v
-        limit = np.minimum(robot.torque_limit, np.finfo(float).max)
+        limit, middle = motor_range(robot)
+        limit = np.minimum(limit, np.finfo(float).max)
         limit[: self._base] = 0.0
-        return np.clip(np.nan_to_num(tau, nan=0.0), -limit, limit)
+        return np.clip(np.nan_to_num(tau, nan=0.0) - middle, -limit, limit) + middle
 
 
 def _singularity_of_base(

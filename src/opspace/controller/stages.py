@@ -130,8 +130,10 @@ class Given:
         q: Configuration, (nq,).
         v: (n,) velocity, rad/s.
         M: (n, n) inertia.
-        bias: (n,) Coriolis, centrifugal and gravity torque, N·m, with the reaction from `balance` on.
-        torque_limit: (n,) what the motors give, N·m.
+        bias: (n,) Coriolis, centrifugal and gravity torque without the middle of what the motors give,
+            N·m, with the reaction from `balance` on.
+        torque_limit: (n,) what the motors give to both sides of its middle, N·m.
+        torque_middle: (n,) the middle, N·m; no torque of the tick has it in it but the last one.
         reaction: (n,) what tasks expect of the world, N·m; None for nothing.
         part: How much of it the motors can give.
         base: Number of the first coordinates without a motor, those of a floating base.
@@ -147,6 +149,7 @@ class Given:
     M: np.ndarray
     bias: np.ndarray
     torque_limit: np.ndarray
+    torque_middle: np.ndarray
     reaction: np.ndarray | None = None
     part: float = 1.0
     base: int = 0
@@ -209,7 +212,9 @@ def tick(k: Given) -> Answer | None:
     found = Found(task_status(k.members, h, terms, mixed), levels, active, apart, kept.contacts)
     happened = status(k, kept.tau, info, found) | kept.status
     placings = NO_PLACINGS if distances is None else distances.by_name
-    return Answer(kept.tau, happened, info.hard_solves, found, kept.hindrance, placings)
+    return Answer(
+        kept.tau + k.torque_middle, happened, info.hard_solves, found, kept.hindrance, placings
+    )
 
 
 def activations(k: Given) -> list[float]:
@@ -326,7 +331,7 @@ def law(
     sets = [*limits.task_sets, *tasks.task_sets]
     if rules.bias == "task":
         # Eq. 3-4: f̃ = f* + η + ζ, the bias as an acceleration of each task.
-        drop = np.linalg.solve(k.M, k.bias)
+        drop = np.linalg.solve(k.M, k.bias + k.torque_middle)
         sets = [task.replace(f=task.f + task.J @ drop) for task in sets]
     first = len(limits.task_sets)
     shifted = [Weighted(w, frozenset(first + i for i in here)) for w, here in tasks.corners]
@@ -338,10 +343,14 @@ def law(
     return rules.law(Question(L, sets, everything, mixed.levels, buffer, motors, motion))
 
 
+def beside_tasks(k: Given) -> np.ndarray:
+    """Give the torque that is there before any task acts, (n,) N·m."""
+    return -k.torque_middle if k.rules.bias == "task" else k.bias
+
+
 def start_inside(k: Given) -> np.ndarray:
     """Begin with the bias where it is compensated at every joint, cut at the motors' limits."""
-    bias = np.zeros(k.bias.size) if k.rules.bias == "task" else k.bias
-    return np.clip(bias, -k.torque_limit, k.torque_limit)
+    return np.clip(beside_tasks(k), -k.torque_limit, k.torque_limit)
 
 
 def begin_limits(k: Given) -> list[LimitTerms]:
@@ -387,7 +396,7 @@ def torque(k: Given, gamma: np.ndarray) -> np.ndarray:
     """Γ = Γ_tasks + b + g (Eq. 4), the bias as far as the motors give it."""
     if k.rules.keep_torque:
         return start_inside(k) + gamma
-    return gamma if k.rules.bias == "task" else gamma + k.bias
+    return gamma + beside_tasks(k)
 
 
 def measure_distances(k: Given) -> DistanceTerms | None:
@@ -415,6 +424,7 @@ def keep_bounds(
         acceleration = np.linalg.solve(k.M, kept.tau - k.bias)
         if rules.period > 0.0 and k.q.size == k.v.size and bounds.near(acceleration):
             own = kept.tau if k.reaction is None else kept.tau - k.reaction
+            own = own + k.torque_middle
             change = change_within_tick(k.robot, own, acceleration, rules.period)
             kept = realise(bounds.after(change), tau, lambda: metric(L, tasks))
     if observer is not None:

@@ -299,7 +299,7 @@ def look_ahead(work, n):
     if not factor(work.later.M, work.later_inertia):
         return False
     for a in range(n):
-        change[a] = work.tau[a] - work.reaction[a] - work.later.bias[a]
+        change[a] = work.tau[a] - work.reaction[a] - work.later.bias[a] + work.torque_middle[a]
     whiten(work.later_inertia, change)
     acceleration_of(work.later_inertia, change)
     for i in range(work.limit.shape[0]):

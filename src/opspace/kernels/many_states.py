@@ -63,6 +63,6 @@ def brake(work, tau):
         if a < work.option[BASE]:
             tau[a] = 0.0
             continue
-        x = work.bias[a] - work.option[DAMPING] * work.M[a, a] * work.v[a]
+        x = work.bias[a] - work.option[DAMPING] * work.M[a, a] * work.v[a] - work.torque_middle[a]
         limit = min(work.torque_limit[a], LARGEST)
-        tau[a] = 0.0 if math.isnan(x) else min(max(x, -limit), limit)
+        tau[a] = 0.0 if math.isnan(x) else min(max(x, -limit), limit) + work.torque_middle[a]

@@ -102,6 +102,8 @@ def tick(t, work):
         return NOT_FINITE
     bits = status(work) | kept | stale(work)
     freeze(work, bits)
+    for a in range(work.tau.shape[0]):
+        work.tau[a] += work.torque_middle[a]
     return bits + SOLVE * closings * stacks * max(limit_stacks, 1)
 
 
@@ -198,7 +200,7 @@ def whiten_tasks(work):
     if work.option[TASK_BIAS] != 0.0:
         # Eq. 3-4: f̃ = f* + η + ζ, the bias as an acceleration of each task.
         for a in range(n):
-            work.drop[a] = work.balance[a]
+            work.drop[a] = work.balance[a] + work.torque_middle[a]
         whiten(work.inertia, work.drop)
     covered = False
     for i in range(work.kind.shape[0]):
@@ -385,6 +387,8 @@ def torque(work):
             work.tau[a] += work.space.start[a]
         elif work.option[TASK_BIAS] == 0.0:
             work.tau[a] += work.balance[a]
+        else:
+            work.tau[a] -= work.torque_middle[a]
 
 
 @jit
@@ -392,7 +396,7 @@ def start_inside(work, n):
     """Begin with the bias where it is compensated at every joint, cut at the limits, (n,) N·m."""
     work.space.motors[0] = 1
     for a in range(n):
-        bias = work.balance[a] if work.option[TASK_BIAS] == 0.0 else 0.0
+        bias = work.balance[a] if work.option[TASK_BIAS] == 0.0 else -work.torque_middle[a]
         work.space.start[a] = min(max(bias, -work.torque_limit[a]), work.torque_limit[a])
 
 

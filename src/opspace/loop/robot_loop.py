@@ -25,6 +25,7 @@ from opspace.loop.loop_report import Counts, LoopReport, answer_times
 from opspace.loop.real_time import RealTime
 from opspace.loop.requests import Changes, RequestDesk, RunRequest
 from opspace.loop.torque_rate import TorqueRate
+from opspace.robots.motor_range import motor_range
 from opspace.tasks import Task
 from opspace.tasks.validation import positive
 
@@ -424,15 +425,14 @@ class Loop:
         assert self._sent is not None
         robot, period = self._controller.robot, self._facts.period
         handover = Handover(self._sent, FADE, back=False)
-        added, still = np.zeros(robot.nv), 0
+        added, still, motors = np.zeros(robot.nv), 0, motor_range(robot)
         for k in range(round(LONGEST_BRAKING / period)):
             state = self._next()
             tau = self._controller.braking(state.q, state.v)
             if self._facts.gravity == "robot":
                 added = robot.gravity
-            self._give(
-                state, handover.torque(k * period, tau, robot.torque_limit, added), Status.OK
-            )
+            mixed = handover.torque(k * period, tau, motors.limit, added - motors.middle)
+            self._give(state, mixed, Status.OK)
             still = still + 1 if np.max(np.abs(state.v)) < STANDING else 0
             if still >= STANDS and handover.done:
                 self._standstill = True

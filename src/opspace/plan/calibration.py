@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from opspace.errors import ModelError
+from opspace.robots.motor_range import motor_range
 from opspace.robots.protocol import BASE, Robot
 from opspace.tasks import Task
 from opspace.tasks.motion_task import MotionTask
@@ -54,12 +55,12 @@ class Workspace:
         self._robot = robot = robot.fresh()
         self._visited: list[tuple[np.ndarray, np.ndarray]] = []
         brake = np.full(robot.nv, np.inf)
-        joint_sigma = np.inf
+        joint_sigma, motors = np.inf, motor_range(robot)
         for q in sample_postures(robot):
             robot.update(q, np.zeros(robot.nv))
             inverse = np.linalg.inv(_checked_inertia(robot))
             joint_sigma = min(joint_sigma, float(np.linalg.eigvalsh(inverse)[0]))
-            spare = np.maximum(robot.torque_limit - np.abs(robot.bias), 0.0)  # at rest
+            spare = np.maximum(motors.limit - np.abs(robot.bias - motors.middle), 0.0)  # at rest
             brake = np.minimum(brake, 0.5 * spare * np.diag(inverse))
             self._visited.append((q, inverse))
         self.brake = np.where(np.isfinite(brake), np.clip(brake, *BRAKE_RANGE), UNKNOWN_BRAKE)

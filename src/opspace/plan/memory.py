@@ -15,6 +15,7 @@ from opspace.plan.contact_records import no_stance
 from opspace.plan.distance_records import DISTANCES
 from opspace.plan.records import INERTIA, SPACE, TICK
 from opspace.robots.motion_axes import MotionAxes
+from opspace.robots.motor_range import MotorRange
 
 
 class Sizes(NamedTuple):
@@ -82,7 +83,7 @@ def _places(size: Sizes) -> dict[str, tuple[int, int, type, tuple[int, ...]]]:
 def make_tick(
     size: Sizes,
     axes: MotionAxes,
-    torque_limit: np.ndarray,
+    motors: MotorRange,
     option: np.ndarray,
     stance: Record | None = None,
 ) -> tuple[Record, np.ndarray]:
@@ -91,7 +92,7 @@ def make_tick(
     Args:
         size: Sizes of the plan.
         axes: The robot's arrays.
-        torque_limit: (n,) what the motors give, N·m.
+        motors: What the motors give.
         option: (OPTION_SIZE,) options of the controller.
         stance: What the robot touches, a `STANCE`; None where it is bolted down.
 
@@ -101,7 +102,7 @@ def make_tick(
     sizes = size.by_name()
     block = Block(np.zeros(TICK.reported_size(sizes) + SPACE.reported_size(sizes)))
     kept = TICK.reported(sizes, block)
-    limit = np.array(torque_limit)  # one that may be written, like all the others
+    limit = np.array(motors.limit)  # one that may be written, like all the others
     inertia = make_inertia(_before(axes))
     space = {"inertia": inertia, "limit": limit, **SPACE.reported(sizes, block)}
     given = {
@@ -111,6 +112,7 @@ def make_tick(
         "mass_place": axes.masses.place,
         "mass": axes.masses.points,
         "torque_limit": limit,
+        "torque_middle": np.array(motors.middle),
         "option": option,
         "inertia": inertia,
         "space": SPACE.make(sizes, space),

@@ -32,6 +32,7 @@ from opspace.plan.pack_task import Packed
 from opspace.plan.scales import Scales
 from opspace.robots.adapter import AdapterBase
 from opspace.robots.motion_axes import MotionAxes
+from opspace.robots.motor_range import MotorRange
 from opspace.stack import Blending, Member, Variable, variables_of
 from opspace.tasks import CollisionAvoidance, JointLimits
 from opspace.tasks.task import CHANGES
@@ -79,7 +80,7 @@ class Plan:
         axes: The robot's arrays.
         scales: What σ is measured in.
         limits: Joint limits, or None.
-        torque_limit: (n,) what the motors give, N·m.
+        motors: What the motors give.
         options: Numbers of the controller's options, (OPTION_SIZE,).
         blending: How activations are blended.
         guard: What is kept apart, or None.
@@ -92,7 +93,7 @@ class Plan:
         axes: MotionAxes,
         scales: Scales,
         limits: JointLimits | None,
-        torque_limit: np.ndarray,
+        motors: MotorRange,
         options: np.ndarray,
         blending: Blending,
         guard: CollisionAvoidance | None = None,
@@ -130,7 +131,7 @@ class Plan:
         )
         self.contacts = contacts
         stance = None if contacts is None else contacts.record
-        self.tick, self.memory = make_tick(self.size, axes, torque_limit, options, stance)
+        self.tick, self.memory = make_tick(self.size, axes, motors, options, stance)
         self.packed = self._pack(scales, presses)
         self.forces = [packed for packed in self.packed if isinstance(packed, PackedForce)]
         self.distances: PackedDistances | None = None

@@ -14,6 +14,7 @@ from opspace.record.obstacle_columns import HEADER_KEY, about_collisions
 from opspace.robots.adapter import added_frames, held_joints
 from opspace.robots.catalogue import CATALOGUE, locate
 from opspace.robots.joint_units import joint_units
+from opspace.robots.motor_range import motor_range
 from opspace.robots.protocol import Robot
 from opspace.tasks import Task
 from opspace.tasks.leading import can_be_led
@@ -60,6 +61,7 @@ def subject_of(
 def _robot(controller: ReferenceController) -> dict[str, Any]:
     robot, limits = controller.robot, controller.stack.limits
     lower, upper = np.array(robot.q_lower), np.array(robot.q_upper)
+    motors = motor_range(robot)
     for side in limits.sides if limits is not None else ():
         (upper if side.sign > 0 else lower)[side.index] = side.limit
     return {
@@ -75,6 +77,7 @@ def _robot(controller: ReferenceController) -> dict[str, Any]:
         "lower": _finite(lower),
         "upper": _finite(upper),
         "torque_limit": _finite(robot.torque_limit),
+        "torque_range": [_finite(end) for end in (motors.least, motors.most)],
         "buffer": limits.buffer if limits is not None and limits.mode == "buffer" else None,
         "brake": {side.name: side.brake for side in limits.sides} if limits is not None else {},
     }

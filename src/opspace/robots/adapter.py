@@ -59,6 +59,11 @@ class AdapterBase(ABC):
         self.q_upper = _frozen(description.q_upper)
         self.velocity_limit = _frozen(description.velocity_limit)
         self.torque_limit = _frozen(description.torque_limit)
+        self.torque_range = _frozen(
+            np.stack((-self.torque_limit, self.torque_limit))
+            if description.torque_range is None
+            else description.torque_range
+        )
         self.actuated = _frozen(description.actuated)
         self.floating_base = description.floating_base
         self.locked_joints = tuple(description.locked)

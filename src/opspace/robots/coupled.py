@@ -128,7 +128,7 @@ def coupled_description(description: Description) -> Description:
                 "joints that follow it within their limits; lock it"
             )
     q = np.clip(description.q_reference[leaders], limits["q_lower"], limits["q_upper"])
-    names = description.joint_names
+    names, uneven = description.joint_names, description.torque_range
     changed: dict[str, Any] = {
         **limits,
         "nq": len(leaders),
@@ -137,6 +137,7 @@ def coupled_description(description: Description) -> Description:
         "joint_units": tuple(description.joint_units[i] for i in leaders),
         "q_reference": q,
         "torque_limit": description.torque_limit[leaders],
+        "torque_range": None if uneven is None else uneven[:, leaders],
         "actuated": description.actuated[leaders],
         "configurations": {n: q[leaders] for n, q in description.configurations.items()},
     }

@@ -69,6 +69,8 @@ class Description:
     Attributes:
         quaternions: Index in q of the first coordinate (w) of every quaternion.
         joint_units: (nv,) unit of each coordinate's position, "rad" or "m".
+        torque_range: (2, nv) least and largest torque where the motors of a fully actuated robot are
+            not alike in both directions, N·m or N; None where all are.
         springs: What pulls at the joints besides, None for nothing.
         couplings: Joints of the file that follow one of these.
         armature: Inertia of the motor at every joint that a URDF was read with, kg·m² or kg.
@@ -97,6 +99,7 @@ class Description:
     armature: float = 0.0
     locked: Mapping[str, float | None] = field(default_factory=dict)
     configurations: Mapping[str, np.ndarray] = field(default_factory=dict)
+    torque_range: np.ndarray | None = None
     springs: Springs | None = None
     warnings: tuple[str, ...] = ()
 

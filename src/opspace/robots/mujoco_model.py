@@ -292,6 +292,7 @@ def describe_mujoco(model: mujoco.MjModel, read: MjcfRobot) -> Description:
         q_upper=upper,
         velocity_limit=np.full(model.nv, np.inf),
         torque_limit=motors.limit,
+        torque_range=motors.range,
         actuated=~free,
         quaternions=_quaternions(model),
         floating_base=bool(free.any()),
@@ -303,7 +304,7 @@ def describe_mujoco(model: mujoco.MjModel, read: MjcfRobot) -> Description:
             *read.roles.warnings,
             *read.warnings,
             *_shared(model),
-            *motor_warnings(motors, names, efforts),
+            *motor_warnings(motors, names, efforts, floating=bool(free.any())),
             *force_warnings(model, motors.limit),
         ),
     )

@@ -68,6 +68,11 @@ class Actuation(NamedTuple):
         """Return the torque that every joint has in both directions, (nv,) N·m or N."""
         return np.array([max(0.0, min(-span.least, span.most)) for span in self.spans])
 
+    @property
+    def range(self) -> np.ndarray:
+        """Return the least and the largest torque of every joint, (2, nv) N·m or N."""
+        return np.array(self.spans).reshape(-1, 2).T
+
     def without(self, followers: Iterable[str]) -> Actuation:
         """Leave out joints that others move: what a tendon gives them is the leader's."""
         gone = set(followers)
@@ -142,13 +147,16 @@ def levers(model: mujoco.MjModel, tendon: int) -> dict[int, float]:
     return arms
 
 
-def motor_warnings(motors: Actuation, joints: Sequence[str], units: Sequence[str]) -> Iterator[str]:
+def motor_warnings(
+    motors: Actuation, joints: Sequence[str], units: Sequence[str], *, floating: bool = False
+) -> Iterator[str]:
     """Say what a torque limit cannot say.
 
     Args:
         motors: The actuators.
         joints: (nv,) names of the coordinates.
         units: (nv,) "N·m" or "N".
+        floating: Whether the base floats, whose forces are shared among motors with one limit each.
 
     Yields:
         A sentence for each thing.
@@ -175,7 +183,7 @@ def motor_warnings(motors: Actuation, joints: Sequence[str], units: Sequence[str
                 f"the motor of {name} gives {least:g} to {most:g} {unit}: it cannot be driven "
                 "both ways"
             )
-        elif not math.isclose(-least, most):
+        elif -least != most and (floating or math.isinf(most - least)):
             yield (
                 f"the motor of {name} gives {least:g} to {most:g} {unit}; {min(-least, most):g} "
                 f"{unit} is taken as its limit in both directions"

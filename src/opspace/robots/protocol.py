@@ -36,7 +36,8 @@ class Robot(Protocol):
         q_lower: (nv,) lower joint limits in rad or m, -inf where there is none.
         q_upper: (nv,) upper joint limits in rad or m, inf where there is none.
         velocity_limit: (nv,) in rad/s or m/s, inf where unknown.
-        torque_limit: (nv,) in N·m or N, inf where unknown.
+        torque_limit: (nv,) in N·m or N, in both directions, inf where unknown. Where a direction has
+            more, a robot may say so by ``torque_range``, (2, nv) least and largest torque.
         actuated: (nv,) False for the coordinates of a floating base.
         floating_base: Whether the root link moves freely.
         locked_joints: Joints of the file that this model holds fixed.

@@ -14,6 +14,7 @@ from opspace.plan.calibration import BRAKE_RANGE, Calibration
 from opspace.plan.scales import Singularity
 from opspace.robots.adapter import AdapterBase, held_joints
 from opspace.robots.joint_units import joint_units
+from opspace.robots.motor_range import motor_range
 from opspace.robots.protocol import Robot
 from opspace.stack import Stack
 from opspace.tasks import OrientationTask, PositionTask, Task
@@ -33,7 +34,9 @@ class JointReport:
         lower: Lower limit, rad or m.
         upper: Upper limit, rad or m.
         max_velocity: rad/s or m/s.
-        max_torque: N·m or N.
+        max_torque: In both directions, N·m or N.
+        least_torque: N·m or N.
+        most_torque: N·m or N.
         gravity: Torque that holds the reference posture, N·m or N; springs of the file count.
         brake: Acceleration with which joint limits count on braking, rad/s² or m/s².
     """
@@ -45,6 +48,8 @@ class JointReport:
     upper: float | None
     max_velocity: float | None
     max_torque: float | None
+    least_torque: float | None
+    most_torque: float | None
     gravity: float
     brake: float | None
 
@@ -144,7 +149,7 @@ def _sigma(controller: Controller) -> tuple[float, ...]:
 def _joints(robot: Robot, calibration: Calibration | None) -> tuple[JointReport, ...]:
     base = robot.nq - int(np.sum(robot.actuated))
     reference = robot.q_reference[base:]
-    units = joint_units(robot)
+    units, motors = joint_units(robot), motor_range(robot)
     found = []
     for place, i in enumerate(np.flatnonzero(robot.actuated)):
         found.append(
@@ -156,6 +161,8 @@ def _joints(robot: Robot, calibration: Calibration | None) -> tuple[JointReport,
                 upper=_known(robot.q_upper[i]),
                 max_velocity=_known(robot.velocity_limit[i]),
                 max_torque=_known(robot.torque_limit[i]),
+                least_torque=_known(motors.least[i]),
+                most_torque=_known(motors.most[i]),
                 gravity=float(robot.bias[i]),
                 brake=None if calibration is None else float(calibration.brake[i]),
             )
@@ -200,7 +207,7 @@ def _joint_warnings(joints: tuple[JointReport, ...]) -> list[str]:
 
     unknown = [j for j in joints if j.max_torque is None]
     near = [j for j in joints if _room(j) < NEAR_LIMIT]
-    weak = [j for j in joints if j.max_torque is not None and abs(j.gravity) > j.max_torque]
+    weak = [j for j in joints if not _holds(j)]
     slow = [j for j in joints if j.brake == BRAKE_RANGE[0]]
     checks = [
         (unknown, "no torque limit is known for {}; nothing keeps their torque in bounds"),
@@ -209,6 +216,12 @@ def _joint_warnings(joints: tuple[JointReport, ...]) -> list[str]:
         (slow, "some posture leaves almost no torque to brake {}: their limits act early"),
     ]
     return [words.format(named(found)) for found, words in checks if found]
+
+
+def _holds(joint: JointReport) -> bool:
+    """Whether a motor gives what the reference posture takes."""
+    least, most = joint.least_torque, joint.most_torque
+    return (least is None or least <= joint.gravity) and (most is None or joint.gravity <= most)
 
 
 def _room(joint: JointReport) -> float:

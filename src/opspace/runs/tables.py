@@ -84,11 +84,20 @@ def joints_table(joints: Sequence[JointReport]) -> tuple[list[str], list[list[st
     ]
     rows = []
     for j in joints:
-        numbers = (j.reference, j.lower, j.upper, j.max_velocity, j.max_torque, j.gravity, j.brake)
+        numbers = (j.reference, j.lower, j.upper, j.max_velocity)
+        loads = (j.gravity, j.brake)
         # Where slides stand among hinges, a row says which of the units is its own.
         name = j.name if len(units) == 1 else f"{j.name} [{j.unit}]"
-        rows.append([name, *map(_written, numbers)])
+        rows.append([name, *map(_written, numbers), _given(j), *map(_written, loads)])
     return heads, rows
+
+
+def _given(joint: JointReport) -> str:
+    """Write what a motor gives, with both ends where they differ."""
+    least, most = joint.least_torque, joint.most_torque
+    if least is None or most is None or -least == most:
+        return _written(joint.max_torque)
+    return f"{_written(least)} to {_written(most)}"
 
 
 def _written(value: bool | float | None) -> str:

@@ -10,6 +10,7 @@ import numpy as np
 
 from opspace.errors import InputError, ModelError, missing_extra
 from opspace.robots.adapter import spread_of
+from opspace.robots.motor_range import motor_range
 from opspace.sim.disturbances import NO_DISTURBANCES, Disturbances, Hand, Wire
 from opspace.sim.ground import Ground
 from opspace.sim.surfaces import Surface, TouchedWorld
@@ -102,7 +103,9 @@ class Plant:
             limit = np.zeros(self.model.nv)
             limit[spread.leaders] = motors
         disturbances.spoil(self.model, limit)
-        self._limit = motors if torque_limits else np.where(robot.actuated, np.inf, 0.0)
+        given = motor_range(robot)
+        ends = (given.least, given.most) if torque_limits else (-np.inf, np.inf)
+        self._ends = tuple(np.where(robot.actuated, end, 0.0) for end in ends)
         self._robot = robot
         self.adds_gravity = adds_gravity
         self._own_model = robot.fresh() if adds_gravity else None
@@ -180,7 +183,7 @@ class Plant:
         if self._own_model is not None:
             self._own_model.update(self.q, self.v)
             asked = asked + self._own_model.gravity
-        applied = np.clip(asked, -self._limit, self._limit)
+        applied = np.clip(asked, *self._ends)
         push = self._hand.torque(self.t, self._own(self.data.qpos), self._own(self.data.qvel))
         given = applied if push is None else applied + push
         for _ in range(self._substeps):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from opspace.command import Command, Status
+from opspace.robots.motor_range import motor_range
 from opspace.scenario.build import Built
 from opspace.tasks.joint_limits import Side
 
@@ -50,7 +51,7 @@ class LimitWatch:
         self._inside = np.zeros(len(self._sides), dtype=bool)
         self._plant = built.plant
         self._pushes = built.scenario.plant.pushes
-        self._torque_limit = built.robot.torque_limit
+        self._motors = motor_range(built.robot)
         self._dt = built.scenario.dt
         self._last: np.ndarray | None = None
         self._ticks = dict.fromkeys((status for status in Status if status), 0)
@@ -64,11 +65,12 @@ class LimitWatch:
         if self._last is not None:
             self._most("max_torque_step", float(np.max(np.abs(tau - self._last))))
         self._last = tau
-        self._most("max_torque_use", float(np.max(np.abs(tau) / self._torque_limit)))
+        used = np.abs(tau - self._motors.middle) / self._motors.limit
+        self._most("max_torque_use", float(np.max(used)))
         self._most("max_joint_speed", float(np.max(np.abs(v))))
         self._most("max_hard_solves", float(command.hard_solves))
         numbers["not_finite"] += not np.all(np.isfinite(tau))
-        numbers["above_torque_limit"] += bool(np.any(np.abs(tau) > self._torque_limit))
+        numbers["above_torque_limit"] += bool(np.any(used > 1.0))
         for status in self._ticks:
             self._ticks[status] += status in command.status
         self._watch_limits(command, self._plant.q, v)

@@ -116,7 +116,8 @@ def joints(frame: Frame, names: Sequence[str], robot: Mapping[str, Any]) -> str:
         place = frame.q[i + free] if free == 0 or i >= 6 else math.nan
         gauge = _range(frame, name, i, float(place), lower, upper, robot)
         unit = effort_unit(units[i])
-        torque = _torque(float(frame.tau[i]), robot["torque_limit"][i], unit)
+        tau = float(frame.tau[i])
+        torque = _torque(tau, _most(tau, i, robot), unit)
         label = f'<span style="{_NAME}" title="{escape(name)}">{escape(short(name, names))}</span>'
         rows.append(f'<div style="{_ROW}">{label}{gauge}{torque}</div>')
     return _panel(rows)
@@ -209,6 +210,14 @@ def _zone(robot: Mapping[str, Any], side: str, speed: float, span: float) -> flo
     if brake and speed > 0.0:
         width = max(width, speed * speed / (2.0 * brake))
     return min(max(width / span, 0.02), 0.5)
+
+
+def _most(tau: float, i: int, robot: Mapping[str, Any]) -> float | None:
+    """What the motor of a joint gives in the direction of its torque, N·m or N; None if unknown."""
+    if "torque_range" not in robot:  # in recordings of before
+        return robot["torque_limit"][i]
+    end = robot["torque_range"][tau >= 0.0][i]
+    return None if end is None else abs(end)
 
 
 def _torque(tau: float, limit: float | None, unit: str) -> str:
