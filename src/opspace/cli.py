@@ -493,7 +493,7 @@ def check(
 ) -> None:
     """Tell what the controller will see of a robot."""
     from opspace.robots import load_robot
-    from opspace.runs.check import check_robot, to_plain
+    from opspace.runs.check import check_robot, rounded, to_plain
     from opspace.runs.tables import joints_table
 
     with warnings.catch_warnings():
@@ -509,10 +509,12 @@ def check(
         print(f"held: {joint}" + ("" if position is None else f" at {position:g}"))
     for relation in report.coupled:
         print(f"follows: {relation}")
+    if report.beside:
+        print(f"not on the way to the tool: {', '.join(report.beside)}")
     print()
     _print_table(*joints_table(report.joints))
     for task, sigma in report.sigma.items():
-        values = ", ".join(f"{value:.3g}" for value in sigma)
+        values = ", ".join(map(rounded, sigma))
         print(f"\n{task}: eigenvalues {values} at the reference posture", end="")
         print(f" (1 is what is usual in the workspace, {report.scale[task]:.3g} {_UNITS[task]})")
     lower, upper = report.buffer

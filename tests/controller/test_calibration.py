@@ -8,7 +8,7 @@ from opspace.loop import simulate
 from opspace.robots import load_robot
 from opspace.sim import Plant
 from opspace.stack import Stack
-from opspace.tasks import MinimumJerk, PositionTask, PostureTask
+from opspace.tasks import MinimumJerk, PoseTask, PositionTask, PostureTask
 
 LINK = (
     '<inertial><origin xyz="0.2 0 0"/><mass value="2"/>'
@@ -61,3 +61,10 @@ def test_a_direction_that_an_arm_never_has_does_not_hide_the_others(planar):
     np.testing.assert_allclose(plain_q, q, atol=1e-6)
     assert plain_step == pytest.approx(step, rel=1e-3)
     assert step < 1.0
+
+
+def test_a_frame_that_nothing_moves_is_no_division_by_zero():
+    robot = load_robot("ur5")
+    stack = Stack([PoseTask(robot.frame_names[0]), PostureTask()])
+    tau = Controller(robot, stack).step(0.0, robot.q_reference, np.zeros(6)).tau
+    assert np.all(np.isfinite(tau))

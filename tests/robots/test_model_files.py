@@ -238,6 +238,36 @@ def test_a_file_is_checked_held_still_or_refused(
     assert off_after(robot) < 1e-3
 
 
+WHEELS = (*ARM, joint("j3", "b", "c"), link("wheel"), link("caster"),
+          joint("drive", "base", "wheel", kind="continuous"),
+          joint("roll", "base", "caster", kind="continuous", axis="0 0 1"))  # fmt: skip
+
+
+@pytest.mark.filterwarnings("ignore::opspace.ModelWarning")
+@pytest.mark.parametrize(
+    ("write", "beside"),
+    [
+        (urdf(*WHEELS), ("drive", "roll")),
+        (urdf(*ARM, joint("j3", "b", "c")), ()),
+        (CASES["gripper with an equality"].write, ("left_driver",)),
+        (scene(around=SECOND, motors=BOTH), ("right_1", "right_2")),
+    ],
+    ids=["wheels", "arm", "gripper", "two arms"],
+)
+def test_joints_that_do_not_move_the_tool_are_named(
+    tmp_path: Path, write: Callable[[Path], Path], beside: tuple[str, ...],
+    capsys: pytest.CaptureFixture[str],
+) -> None:  # fmt: skip
+    path = write(tmp_path)
+    report = check_robot(load_robot(path))
+    assert report.beside == beside
+    _, printed, _ = run(capsys, "check", str(path))
+    assert ("not on the way to the tool: " + ", ".join(beside) in printed) == bool(beside)
+    # Fingers that go a few centimetres are always within a tenth of a metre of their ends.
+    assert not any("of a limit" in sentence for sentence in report.warnings)
+    assert "e-1" not in printed
+
+
 @pytest.mark.filterwarnings("ignore::opspace.ModelWarning")
 @pytest.mark.parametrize(
     "what",

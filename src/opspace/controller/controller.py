@@ -317,7 +317,9 @@ class Controller(ReferenceController):
             return None
         model = self._bodies = robot.rigid_model()
         if model is None:
-            return robot.motion_axes()
+            axes = robot.motion_axes()
+            apart = self._collisions is not None
+            return None if apart and axes is not None and axes.followers else axes
         return model.motion_axes(make_dynamics(model.bodies), *robot.state)
 
     def _not_compiled(self) -> str:
@@ -365,8 +367,8 @@ class Controller(ReferenceController):
             self._bodies = robot.rigid_model()
         if self._bodies is None or not isinstance(robot, AdapterBase):
             raise InputError(
-                f"robot {robot.name!r} is not one of load_robot with hinges and slides; {who} "
-                "needs its bodies"
+                f"robot {robot.name!r} is not one of load_robot with hinges and slides that each move "
+                f"alone; {who} needs its bodies"
             )
         return robot, self._bodies
 
@@ -386,7 +388,7 @@ class Controller(ReferenceController):
             if last is not None and outlook.members is last.members:
                 continue
             copies, plan = outlook.copies, None
-            if Plan.fits(copies):
+            if Plan.fits(copies, axes):
                 key = structure(copies)
                 plan = ready.get(key) or known.get(key)
                 if plan is None or not self._watches_all(plan):
@@ -426,7 +428,7 @@ class Controller(ReferenceController):
         before, key = self._plan, structure(members)
         plan = before if before is not None and before.structure == key else self._ready.get(key)
         if plan is None or not self._watches_all(plan):
-            if not Plan.fits(members):
+            if not Plan.fits(members, self._axes):
                 return None
             plan = self._planned(members, self._axes)
         variables = variables_of(members)

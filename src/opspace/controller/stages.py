@@ -42,6 +42,7 @@ from opspace.law import (
 from opspace.law.blending import combined
 from opspace.law.scalars import SCALED, room_for
 from opspace.plan.scales import Scales
+from opspace.robots.adapter import spread_of
 from opspace.robots.protocol import Robot
 from opspace.stack import Blending, ContactMember, Member, Mixture, mixture, presences
 from opspace.tasks import JointLimits, PostureTask, TaskTerms, TrackingTask
@@ -422,7 +423,7 @@ def keep_bounds(
         bounds = Bounds(keeps, k.M, k.bias, room, distances)
         kept = realise(bounds, tau, lambda: metric(L, tasks))
         acceleration = np.linalg.solve(k.M, kept.tau - k.bias)
-        if rules.period > 0.0 and k.q.size == k.v.size and bounds.near(acceleration):
+        if looks_ahead(k) and bounds.near(acceleration):
             own = kept.tau if k.reaction is None else kept.tau - k.reaction
             own = own + k.torque_middle
             change = change_within_tick(k.robot, own, acceleration, rules.period)
@@ -430,6 +431,11 @@ def keep_bounds(
     if observer is not None:
         observer.remember(k.t, k.v, np.linalg.solve(k.M, kept.tau - k.bias))
     return kept
+
+
+def looks_ahead(k: Given) -> bool:
+    """Tell whether the change of accelerations within a tick counts: not with joints that follow."""
+    return k.rules.period > 0.0 and k.q.size == k.v.size and spread_of(k.robot) is None
 
 
 def metric(L: np.ndarray, tasks: Blend) -> np.ndarray:

@@ -98,8 +98,9 @@ class Workspace:
         reference = np.median(alone, axis=0)
         if held and np.median(held) > STRUCTURAL * reference[angular][0]:
             reference[angular] = np.minimum(reference[angular], 2.0 * np.median(held))
-        if angular.any() and not angular.all():
-            weight = np.sqrt(np.outer(reference, reference))
+        weight = np.sqrt(np.outer(reference, reference))
+        # A frame that nothing moves has no scale.
+        if angular.any() and not angular.all() and np.all(weight > 0.0):
             together = np.median([np.linalg.eigvalsh(S / weight)[0] for S in everything])
             if together > STRUCTURAL:
                 reference = reference * together

@@ -27,7 +27,7 @@ from opspace.law.press_columns import (
 )
 from opspace.machine.field_table import Record
 from opspace.plan.pack_momentum import PackedMomentum
-from opspace.plan.pack_task import Packed, kind_of
+from opspace.plan.pack_task import Packed, code_of, kind_of
 from opspace.robots.adapter import AdapterBase
 from opspace.robots.motion_axes import MotionAxes
 from opspace.stack import Member
@@ -127,7 +127,7 @@ def pack(
 ) -> Packed:
     """Lay a task out in the arrays of a plan; the arguments are those of `Packed`."""
     kind: Any = Packed
-    code = kind_of(member.task)
+    code = code_of(member.task, axes)
     if code == FORCE:
         kind = PackedForce
     elif code == MOMENTUM:

@@ -113,6 +113,23 @@ def kind_of(task: Task) -> int:
     return MOTION if known_parts else OWN
 
 
+def code_of(task: Task, axes: MotionAxes) -> int:
+    """Tell what the compiled tick evaluates of a task on a robot: not what its followers move."""
+    code = kind_of(task)
+    return OWN if code and hides(axes, task) else code
+
+
+def hides(axes: MotionAxes, task: Task) -> bool:
+    """Tell whether joints that follow others move what a task measures."""
+    source = getattr(task, "source", None)
+    if not axes.followers or source is None:
+        return False
+    if isinstance(source, CenterOfMass):
+        return True
+    ids = source.ids if isinstance(source, RelativeFrame) else (source.id,)
+    return any(axes.frames[id_].hidden for id_ in ids)
+
+
 def _of_joints(task: PostureTask) -> bool:
     """Tell whether a posture has nothing of a floating base, where q and v count differently."""
     layout = task.layout
@@ -167,7 +184,7 @@ class Packed:
         self.task: Any = task
         self.index = index
         self.rows = slice(first, first + task.rows)
-        code = kind_of(task)
+        code = code_of(task, axes)
         self.own_kind = code == OWN
         self.moving = True
         self._timed = False

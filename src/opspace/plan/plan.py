@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from opspace.kernels.columns import (
+    FORCE,
     LIMIT_BOUND,
     LIMIT_BUFFER,
     LIMIT_K1,
@@ -28,7 +29,7 @@ from opspace.plan.memory import Sizes, make_tick
 from opspace.plan.pack_contacts import PackedContacts
 from opspace.plan.pack_distances import PackedDistances
 from opspace.plan.pack_force import PackedForce, pack, presses_of
-from opspace.plan.pack_task import Packed
+from opspace.plan.pack_task import Packed, hides, kind_of
 from opspace.plan.scales import Scales
 from opspace.robots.adapter import AdapterBase
 from opspace.robots.motion_axes import MotionAxes
@@ -155,10 +156,14 @@ class Plan:
         self.handle = self.tick.handle()
 
     @staticmethod
-    def fits(members: Sequence[Member]) -> bool:
-        """Tell whether the bit sets are wide enough."""
+    def fits(members: Sequence[Member], axes: MotionAxes | None = None) -> bool:
+        """Tell whether the bit sets are wide enough, and no hidden frame of a robot presses."""
         places = sum(len(member.places) for member in members)
-        return len(members) + places <= MOST
+        if len(members) + places > MOST:
+            return False
+        if axes is None or not axes.followers:
+            return True
+        return not any(kind_of(m.task) == FORCE and hides(axes, m.task) for m in members)
 
     def refresh(self, robot: AdapterBase, t: float) -> None:
         """Bring targets, gains, and what users compute themselves up to date.

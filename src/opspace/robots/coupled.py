@@ -10,7 +10,8 @@ import numpy as np
 from opspace.errors import ModelError
 from opspace.robots.adapter import AdapterBase
 from opspace.robots.description import Description
-from opspace.robots.motion_axes import MotionAxes
+from opspace.robots.motion_axes import FramePlace, MassPoint, MotionAxes
+from opspace.robots.payload import Masses
 from opspace.robots.rigid_model import RigidModel
 from opspace.robots.spread import Spread
 
@@ -19,7 +20,7 @@ class CoupledRobot(AdapterBase):
     """A robot with the coordinates of the joints that lead; exact for linear relations.
 
     With v_all = G v the inertia is Gᵀ M G and the bias Gᵀ (b + g), for G is constant. Compiled code
-    knows no such joints: it asks this robot.
+    takes both from here, and moves the frames that no follower moves; the others it asks this robot for.
     """
 
     _model: AdapterBase
@@ -35,6 +36,8 @@ class CoupledRobot(AdapterBase):
         self._model = model
         self.spread = self._all = Spread.of(model.joint_names, description.couplings)
         self._G = self._all.G
+        self._own = model._motion_axes()
+        self._axes = np.zeros((self.nv, 6))
         self._hold(np.zeros((self.nv, self.nv)), np.zeros(self.nv))
         self.update(self.q_reference, np.zeros(self.nv))
 
@@ -42,8 +45,43 @@ class CoupledRobot(AdapterBase):
         return CoupledRobot(self.description, self._model.fresh())
 
     def _motion_axes(self) -> MotionAxes | None:
-        """Return None: one coordinate moves several joints."""
-        return None
+        """Return the arrays of the joints that lead; what followers move is hidden."""
+        own = self._own
+        if own is None:
+            return None
+        place = {int(i): k for k, i in enumerate(self._all.leaders)}
+
+        def above(joint: int) -> tuple[int, bool]:
+            """Find the nearest joint that leads on the way to the base, and whether none follows."""
+            hidden, last = False, -1
+            while joint >= 0:
+                if joint not in place:
+                    hidden = True
+                elif last < 0:
+                    last = place[joint]
+                joint = int(own.parent[joint])
+            return last, hidden
+
+        frames: dict[int, FramePlace] = {}
+        for id_, frame in own.frames.items():
+            joint, hidden = above(frame.joint)
+            frames[id_] = FramePlace(frame.body, joint, frame.local, hidden)
+        links = [
+            MassPoint(int(body), above(int(joint))[0], float(point[0]), point[1:].copy())
+            for (body, joint), point in zip(own.masses.place, own.masses.points, strict=True)
+        ]
+        return MotionAxes(
+            q=self._q,
+            v=self._v,
+            M=self._M,
+            bias=self._bias,
+            axes=self._axes,
+            placement=own.placement,
+            parent=np.array([above(int(own.parent[i]))[0] for i in self._all.leaders]),
+            frames=frames,
+            masses=Masses(links, frames),
+            followers=True,
+        )
 
     def _rigid_model(self) -> RigidModel | None:
         """Return None: one coordinate moves several joints."""
@@ -62,6 +100,8 @@ class CoupledRobot(AdapterBase):
         model.update(self._all.positions(self._q), G @ self._v)
         self._M[:] = G.T @ model.M @ G
         self._bias[:] = G.T @ model.bias
+        if self._own is not None:
+            np.take(self._own.axes, self._all.leaders, axis=0, out=self._axes)
 
     def _links(self) -> tuple[float, np.ndarray]:
         return self._model._links()

@@ -20,11 +20,14 @@ class FramePlace:
         body: Row of ``MotionAxes.placement`` that carries it, −1 for the world.
         joint: Last joint (velocity coordinate) that moves it, −1 for none.
         local: (12,) its placement on the body: rotation by columns, then position, m.
+        hidden: Whether a joint that follows another is on its way: then ``joint`` does not say how it
+            moves.
     """
 
     body: int
     joint: int
     local: np.ndarray
+    hidden: bool = False
 
 
 @dataclass(frozen=True)
@@ -66,6 +69,7 @@ class MotionAxes:
             robot's library does.
         dynamics: `DYNAMICS`, where it computes them.
         later: `DYNAMICS`, the same at another state.
+        followers: Whether joints follow others; what they carry is in M and bias, not in ``masses``.
     """
 
     q: np.ndarray
@@ -80,3 +84,4 @@ class MotionAxes:
     bodies: Record = field(default_factory=no_bodies)
     dynamics: Record = field(default_factory=lambda: make_dynamics(no_bodies()))
     later: Record = field(default_factory=lambda: make_dynamics(no_bodies()))
+    followers: bool = False

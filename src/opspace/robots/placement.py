@@ -86,7 +86,7 @@ class FramePlaces(Mapping[int, "FramePlace"]):
         place = self._own[added.parent]
         rotation, position = place.local[:9].reshape(3, 3).T, place.local[9:]
         there = (rotation @ added.rotation).T.reshape(9), position + rotation @ added.position
-        return type(place)(place.body, place.joint, np.concatenate(there))
+        return type(place)(place.body, place.joint, np.concatenate(there), place.hidden)
 
     def __iter__(self) -> Iterator[int]:
         yield from self._own

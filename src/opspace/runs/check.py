@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import asdict, dataclass
+from itertools import islice
 from typing import Any
 
 import numpy as np
 
 from opspace.controller import Controller
 from opspace.errors import InputError
-from opspace.plan.calibration import BRAKE_RANGE, Calibration
+from opspace.plan.calibration import BRAKE_RANGE, Calibration, sample_postures
 from opspace.plan.scales import Singularity
 from opspace.robots.adapter import AdapterBase, held_joints
 from opspace.robots.joint_units import joint_units
@@ -20,7 +21,15 @@ from opspace.stack import Stack
 from opspace.tasks import OrientationTask, PositionTask, Task
 
 NEAR_LIMIT = 0.1
-"""A reference posture closer to a joint limit than this is reported, rad or m."""
+"""A reference posture closer to a joint limit than this is reported, rad or m..."""
+NEAR_END = 0.1
+"""... unless it is further away than this part of the range: fingers go a few centimetres."""
+POSTURES = 8
+"""Postures in which a joint is tried out."""
+UNMOVED = 1e-9
+"""A tool that moves less than this, m or rad per rad or m, is not moved."""
+ROUNDING = 1e-12
+"""What is smaller is none, in whatever unit."""
 
 
 @dataclass(frozen=True)
@@ -67,6 +76,8 @@ class RobotCheck:
         locked: Where joints of the file are held, rad or m; None for those with several
             coordinates.
         coupled: Joints that follow others, with the relation.
+        beside: Joints that do not move the tool: wheels and casters of a base that stands, fingers, the
+            other arm.
         sigma: Eigenvalues of J M⁻¹ Jᵀ at the reference posture by task, strongest first, as
             multiples of what is usual in the workspace.
         scale: That mean by task, 1/kg or 1/(kg·m²).
@@ -81,6 +92,7 @@ class RobotCheck:
     joints: tuple[JointReport, ...]
     locked: dict[str, float | None]
     coupled: tuple[str, ...]
+    beside: tuple[str, ...]
     sigma: dict[str, tuple[float, ...]]
     scale: dict[str, float]
     buffer: tuple[float, float]
@@ -121,6 +133,7 @@ def check_robot(robot: Robot) -> RobotCheck:
         joints=joints,
         locked=dict(held_joints(robot)),
         coupled=_coupled(robot),
+        beside=() if calibration is None else _beside(robot),
         sigma=sigma,
         scale=scale,
         buffer=(option.lower, option.upper),
@@ -138,6 +151,11 @@ def to_plain(report: RobotCheck) -> dict[str, Any]:
         The same, with null for what is not known.
     """
     return asdict(report)
+
+
+def rounded(value: float) -> str:
+    """Write a number for people, what is rounding only as zero."""
+    return f"{value if abs(value) > ROUNDING else 0.0:.3g}"
 
 
 def _sigma(controller: Controller) -> tuple[float, ...]:
@@ -179,6 +197,15 @@ def _coupled(robot: Robot) -> tuple[str, ...]:
     return tuple(map(str, robot.description.couplings)) if isinstance(robot, AdapterBase) else ()
 
 
+def _beside(robot: Robot) -> tuple[str, ...]:
+    """Name the joints that move the tool in none of some postures."""
+    moved, frame = np.zeros(robot.nv), robot.frame_id(robot.tool)
+    for q in islice(sample_postures(robot), POSTURES):
+        robot.update(q, np.zeros(robot.nv))
+        moved = np.maximum(moved, np.abs(robot.jacobian(frame)).max(axis=0))
+    return tuple(n for n, most in zip(robot.joint_names, moved, strict=True) if most < UNMOVED)
+
+
 def _known(value: float) -> float | None:
     return float(value) if math.isfinite(value) else None
 
@@ -197,7 +224,7 @@ def _singular(task: Task, sigma: tuple[float, ...], option: Singularity) -> list
     )
     return [
         f"the reference posture is near a singularity of the {task.name}: the weakest "
-        f"eigenvalue {sigma[-1]:.3g} lies {effect}"
+        f"eigenvalue {rounded(sigma[-1])} lies {effect}; load_robot(reference=...) takes another"
     ]
 
 
@@ -206,7 +233,7 @@ def _joint_warnings(joints: tuple[JointReport, ...]) -> list[str]:
         return ", ".join(joint.name for joint in found)
 
     unknown = [j for j in joints if j.max_torque is None]
-    near = [j for j in joints if _room(j) < NEAR_LIMIT]
+    near = [j for j in joints if _room(j) < min(NEAR_LIMIT, NEAR_END * _range(j))]
     weak = [j for j in joints if not _holds(j)]
     slow = [j for j in joints if j.brake == BRAKE_RANGE[0]]
     checks = [
@@ -224,8 +251,19 @@ def _holds(joint: JointReport) -> bool:
     return (least is None or least <= joint.gravity) and (most is None or joint.gravity <= most)
 
 
+def _range(joint: JointReport) -> float:
+    """How far a joint can go, rad or m."""
+    return _upper(joint) - _lower(joint)
+
+
+def _lower(joint: JointReport) -> float:
+    return -math.inf if joint.lower is None else joint.lower
+
+
+def _upper(joint: JointReport) -> float:
+    return math.inf if joint.upper is None else joint.upper
+
+
 def _room(joint: JointReport) -> float:
     """Distance of the reference posture from the nearer limit."""
-    below = math.inf if joint.lower is None else joint.reference - joint.lower
-    above = math.inf if joint.upper is None else joint.upper - joint.reference
-    return min(below, above)
+    return min(joint.reference - _lower(joint), _upper(joint) - joint.reference)

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 
 from opspace.record import Recording
 from opspace.robots.joint_units import effort_unit
-from opspace.runs.check import JointReport
+from opspace.runs.check import JointReport, rounded
 from opspace.runs.event_times import began
 from opspace.runs.metrics import UNITS, Metrics, largest_torque_step
 from opspace.scenario.events import Event, in_order
@@ -105,4 +105,4 @@ def _written(value: bool | float | None) -> str:
         return "-"
     if isinstance(value, bool):
         return "yes" if value else "no"
-    return f"{value:.3g}"
+    return rounded(value)
