@@ -242,6 +242,52 @@ def test_a_wrench_that_is_missing_is_an_error_by_name(kind):
 
 
 @KINDS
+@pytest.mark.parametrize(
+    "given",
+    [
+        np.zeros((6, 1)), np.zeros(5), np.float64(1.0), np.full(6, np.inf), ["a"] * 6,
+        np.array([0.0, 0.0, 0.0, 0.0, np.inf, -np.inf]),
+    ],
+    ids=["column", "five", "number", "inf", "words", "cancelling"],
+)  # fmt: skip
+def test_a_wrench_of_the_running_tick_that_is_none_is_refused_and_leaves_nothing(kind, given):
+    """The second tick takes the short way, in which nothing may be let through either."""
+    press = osc.ForceTask(name="press")
+    controller = kind(ROBOT.fresh(), osc.Stack([press]))
+    q, v = state(ROBOT)
+    good = on_environment(placed(q, v), 3.0)
+    for i in range(3):
+        controller.step(i * DT, q, v, wrenches={TOOL: good})
+    before = press.memory.row.copy()
+    with pytest.raises(InputError, match="wrench"):
+        controller.step(3 * DT, q, v, wrenches={TOOL: given})
+    np.testing.assert_array_equal(press.memory.row, before)
+    np.testing.assert_array_equal(controller.wrenches[TOOL], good)
+
+
+@pytest.mark.parametrize(
+    "as_given",
+    [
+        lambda w: w, list, lambda w: w.astype(np.float32), lambda w: w.astype(">f8"),
+        lambda w: np.repeat(w, 2)[::2], lambda w: w.astype(int),
+    ],
+    ids=["array", "list", "single", "big-endian", "every second", "whole"],
+)  # fmt: skip
+def test_a_wrench_counts_in_whatever_form_it_is_given(as_given):
+    """Numbers that all these forms can hold, so that the torque is the same to the last bit."""
+    q, v = state(ROBOT)
+    taus = []
+    for form in (lambda w: w, as_given):
+        controller = osc.Controller(ROBOT.fresh(), osc.Stack([osc.ForceTask(), osc.PostureTask()]))
+        for i in range(4):
+            given = np.array([1.0, -2.0, 3.0 + i, 0.0, 1.0, 0.0])
+            tau = controller.step(i * DT, q, v, wrenches={TOOL: form(given)}).tau
+            np.testing.assert_array_equal(controller.wrenches[TOOL], given)
+        taus.append(tau)
+    np.testing.assert_array_equal(*taus)
+
+
+@KINDS
 def test_a_stale_wrench_is_reported_and_the_arm_presses_on_with_what_it_commanded(kind):
     press = osc.ForceTask(force=10.0)
     controller = kind(ROBOT.fresh(), osc.Stack([press, osc.PostureTask()]))
