@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -107,7 +109,7 @@ def test_an_impedance_rests_where_its_spring_holds_the_push(seed, stiffness, top
     J = robot.jacobian(robot.frame_id(TOOL))[:3]
     acceleration = J @ np.linalg.solve(robot.M, tau - robot.bias + J.T @ push)
     size = np.max(np.abs(J @ np.linalg.solve(robot.M, J.T @ push)))
-    np.testing.assert_allclose(acceleration, 0.0, atol=1e-9 * max(1.0, size))
+    np.testing.assert_allclose(acceleration, 0.0, atol=1e-10 * max(1.0, size))
 
 
 @given(
@@ -126,6 +128,20 @@ def test_gains_that_are_taken_are_stable_on_every_surface(kv, kp, part, mass, de
     elif part > 0.5 + 1e-9:
         with pytest.raises(InputError, match="not stable on every surface"):
             osc.ForceTask(kv=kv, kp=kp, ki=ki)
+
+
+@given(
+    st.floats(1.0, 200.0), st.floats(0.0, 2.0), st.floats(0.1, 50.0), st.floats(1.0, 7.0)
+)  # fmt: skip
+def test_the_limit_of_the_loop_is_the_damping_whatever_is_touched(kv, kp, mass, decades):
+    """At ki = kv (1 + kp) a root lies on the axis, at the frequency √(k (1 + kp)/m) of the spring."""
+    k, ki = 10.0**decades, kv * (1.0 + kp)
+    s = 1j * math.sqrt(k * (1.0 + kp) / mass)
+    terms = np.array([mass * s**3, mass * kv * s**2, k * (1.0 + kp) * s, k * ki])
+    assert abs(np.sum(terms)) <= 1e-10 * np.max(np.abs(terms))
+    # There the open loop is -1, for every stiffness and mass.
+    loop = k * (1.0 + kp) * (s + ki / (1.0 + kp)) / (mass * s**2 * (s + kv))
+    assert loop == pytest.approx(-1.0, rel=1e-10)
 
 
 def test_gains_that_would_not_hold_are_refused_later_too():
