@@ -87,6 +87,7 @@ class GiveWay:
         self.task = task
         self._t = -math.inf
         self._c = 0.0
+        self._left = 0.0  # of the confidence, since the task was last asked
         self._n = np.zeros(3)
         self._shift = 0.0
         self._kept = np.zeros(3)
@@ -111,15 +112,18 @@ class GiveWay:
         dt = passed(t, self._t)
         known = self.task.memory.before(t) if self.task.memory.asked_since(self._t) else None
         self._t, self._before, self._now = t, self._now, x
-        self._c *= 1.0 - lag(dt, FALL)
+        self._left *= 1.0 - lag(dt, FALL)
         if known is not None and known[2].any():  # a task that begins in this tick knows nothing
             c, travel, n = known
             if n @ self._n < TURNED:
                 self._kept, self._shift = self._kept + self._shift * self._n, 0.0
-            self._c, self._n = max(c, self._c), n
+            self._left = self._left if c < self._left else 0.0
+            self._c, self._n = max(c, self._left), n
             if dt > 0.0 and self._before is not None:
                 away = travel - float(n @ (self._before + self._kept)) - self._shift
                 self._shift += self._c * lag(dt, FOLLOW) * away
+        else:
+            self._left = self._c = (1.0 - lag(dt, FALL)) * self._c
         if dt > 0.0 and v.size:
             self._shift -= self._c * dt * float(self._n @ v)
 
