@@ -71,6 +71,7 @@ if TYPE_CHECKING:
     from opspace.robots.shapes import LinkCapsule as LinkCapsule
     from opspace.sim import Board as Board
     from opspace.sim import Ground as Ground
+    from opspace.sim import Hole as Hole
     from opspace.sim import Plant as Plant
     from opspace.sim import Surface as Surface
     from opspace.sim import Wall as Wall
@@ -144,7 +145,7 @@ _NAMES = {
     ),
     "opspace.plan.calibration": "Calibration",
     "opspace.plan.scales": "Singularity",
-    "opspace.sim": "Board Ground Plant Surface Wall",
+    "opspace.sim": "Board Ground Hole Plant Surface Wall",
     "opspace.stack": "Stack",
     "opspace.tasks": (
         "ActivationProduct ActivationUnion AngularMomentumTask Ball Box Capsule Chain Circle "

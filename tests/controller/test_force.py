@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -107,7 +109,7 @@ def test_an_impedance_rests_where_its_spring_holds_the_push(seed, stiffness, top
     J = robot.jacobian(robot.frame_id(TOOL))[:3]
     acceleration = J @ np.linalg.solve(robot.M, tau - robot.bias + J.T @ push)
     size = np.max(np.abs(J @ np.linalg.solve(robot.M, J.T @ push)))
-    np.testing.assert_allclose(acceleration, 0.0, atol=1e-9 * max(1.0, size))
+    np.testing.assert_allclose(acceleration, 0.0, atol=1e-10 * max(1.0, size))
 
 
 @given(
@@ -126,6 +128,20 @@ def test_gains_that_are_taken_are_stable_on_every_surface(kv, kp, part, mass, de
     elif part > 0.5 + 1e-9:
         with pytest.raises(InputError, match="not stable on every surface"):
             osc.ForceTask(kv=kv, kp=kp, ki=ki)
+
+
+@given(
+    st.floats(1.0, 200.0), st.floats(0.0, 2.0), st.floats(0.1, 50.0), st.floats(1.0, 7.0)
+)  # fmt: skip
+def test_the_limit_of_the_loop_is_the_damping_whatever_is_touched(kv, kp, mass, decades):
+    """At ki = kv (1 + kp) a root lies on the axis, at the frequency √(k (1 + kp)/m) of the spring."""
+    k, ki = 10.0**decades, kv * (1.0 + kp)
+    s = 1j * math.sqrt(k * (1.0 + kp) / mass)
+    terms = np.array([mass * s**3, mass * kv * s**2, k * (1.0 + kp) * s, k * ki])
+    assert abs(np.sum(terms)) <= 1e-10 * np.max(np.abs(terms))
+    # There the open loop is -1, for every stiffness and mass.
+    loop = k * (1.0 + kp) * (s + ki / (1.0 + kp)) / (mass * s**2 * (s + kv))
+    assert loop == pytest.approx(-1.0, rel=1e-10)
 
 
 def test_gains_that_would_not_hold_are_refused_later_too():
@@ -239,6 +255,52 @@ def test_a_wrench_that_is_missing_is_an_error_by_name(kind):
         controller.step(0.0, q, v, wrenches={TOOL: np.full(6, np.nan)})
     command = controller.step(0.0, q, v, wrenches={TOOL: np.zeros(6)})
     assert command.status == Status.OK
+
+
+@KINDS
+@pytest.mark.parametrize(
+    "given",
+    [
+        np.zeros((6, 1)), np.zeros(5), np.float64(1.0), np.full(6, np.inf), ["a"] * 6,
+        np.array([0.0, 0.0, 0.0, 0.0, np.inf, -np.inf]),
+    ],
+    ids=["column", "five", "number", "inf", "words", "cancelling"],
+)  # fmt: skip
+def test_a_wrench_of_the_running_tick_that_is_none_is_refused_and_leaves_nothing(kind, given):
+    """The second tick takes the short way, in which nothing may be let through either."""
+    press = osc.ForceTask(name="press")
+    controller = kind(ROBOT.fresh(), osc.Stack([press]))
+    q, v = state(ROBOT)
+    good = on_environment(placed(q, v), 3.0)
+    for i in range(3):
+        controller.step(i * DT, q, v, wrenches={TOOL: good})
+    before = press.memory.row.copy()
+    with pytest.raises(InputError, match="wrench"):
+        controller.step(3 * DT, q, v, wrenches={TOOL: given})
+    np.testing.assert_array_equal(press.memory.row, before)
+    np.testing.assert_array_equal(controller.wrenches[TOOL], good)
+
+
+@pytest.mark.parametrize(
+    "as_given",
+    [
+        lambda w: w, list, lambda w: w.astype(np.float32), lambda w: w.astype(">f8"),
+        lambda w: np.repeat(w, 2)[::2], lambda w: w.astype(int),
+    ],
+    ids=["array", "list", "single", "big-endian", "every second", "whole"],
+)  # fmt: skip
+def test_a_wrench_counts_in_whatever_form_it_is_given(as_given):
+    """Numbers that all these forms can hold, so that the torque is the same to the last bit."""
+    q, v = state(ROBOT)
+    taus = []
+    for form in (lambda w: w, as_given):
+        controller = osc.Controller(ROBOT.fresh(), osc.Stack([osc.ForceTask(), osc.PostureTask()]))
+        for i in range(4):
+            given = np.array([1.0, -2.0, 3.0 + i, 0.0, 1.0, 0.0])
+            tau = controller.step(i * DT, q, v, wrenches={TOOL: form(given)}).tau
+            np.testing.assert_array_equal(controller.wrenches[TOOL], given)
+        taus.append(tau)
+    np.testing.assert_array_equal(*taus)
 
 
 @KINDS

@@ -27,7 +27,7 @@ def test_a_force_along_rows_of_the_stack_is_the_wish_for_what_it_would_do(stack,
     g = pressed(seed, stack.tasks[which % len(stack.tasks)])
     asked = task_torque(stack.M, wished(stack, g))
     given_beside = g + task_torque(stack.M, stack.tasks)
-    np.testing.assert_allclose(asked, given_beside, atol=1e-9 * scale_of(asked, g), rtol=0)
+    np.testing.assert_allclose(asked, given_beside, atol=1e-10 * scale_of(asked, g), rtol=0)
 
 
 @given(stacks(max_tasks=4), st.integers(0, 2**32 - 1), st.sampled_from(["idv", "chain"]))
@@ -50,4 +50,4 @@ def test_stacks_that_carry_torques_blend_to_the_sum_of_activation_times_torque(s
                 wish = task.J @ np.linalg.solve(M, u + carried)
             values[k] = values[k] + w * wish
     fed = task_torque(M, [t.replace(f=f) for t, f in zip(full, values, strict=True)])
-    np.testing.assert_allclose(fed, blended, atol=1e-9 * scale_of(fed, blended, *g), rtol=0)
+    np.testing.assert_allclose(fed, blended, atol=1e-10 * scale_of(fed, blended, *g), rtol=0)

@@ -149,8 +149,11 @@ class Controller(ReferenceController):
                 self._begin_anew()
                 return self._hold(t, STATUSES[timing])
         members = begin_tick(t)
-        if wrenches is not None or self._forces is not None:
-            timing |= int(self._sensed(t, wrenches, members))
+        forces = self._forces
+        if forces is not None:
+            timing |= forces.take(t, wrenches, members)
+        elif wrenches is not None:
+            timing |= self._sensed(t, wrenches, members)
         footing = ()
         if stands:
             timing |= self._touch(t)
@@ -162,7 +165,7 @@ class Controller(ReferenceController):
                 self._leave(members)
                 return self._answer(t, members, STATUSES[timing])
         _, plan, address, torque, memory = laid_out
-        if self._forces is not None:
+        if forces is not None:
             plan.remember()
         if plan.moving or CHANGES.last is not plan.seen:
             if plan.distances is not None and not self._watches_all(plan):
@@ -177,8 +180,8 @@ class Controller(ReferenceController):
         if stands:
             footing = self._stood(tau)
         status = STATUSES[answer % SOLVE | timing]
-        if timing and self._forces is not None:  # the tick knows what happened in it
-            self._forces.after(status)
+        if timing and forces is not None:  # the tick knows what happened in it
+            forces.after(status)
         # Bytes are copied in half the time of an array; the tuple's own constructor takes twice this.
         command = NEW(
             Command, (t, tau, status, answer // SOLVE, CompiledReport(plan, memory(), footing))

@@ -319,7 +319,7 @@ class ReferenceController:
         """Tell whether a command leaves as the tick has made it."""
         return not self._robot_adds and self._integral is None and self._fall is None
 
-    def _sensed(self, t: float, wrenches: Wrenches | None, members: Sequence[Member]) -> Status:
+    def _sensed(self, t: float, wrenches: Wrenches | None, members: Sequence[Member]) -> int:
         """Hand the wrenches of a tick to the tasks that need them."""
         if self._forces is None:
             self._forces = WrenchInput(self._robot)

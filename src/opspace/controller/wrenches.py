@@ -5,18 +5,23 @@ from __future__ import annotations
 import weakref
 from collections.abc import Iterator, Mapping, Sequence
 from math import isfinite
-from typing import TypeAlias
+from typing import Any, TypeAlias, cast
 
 import numpy as np
+from numpy import ndarray
 from numpy.typing import ArrayLike
 
 from opspace.command import Status
 from opspace.errors import InputError
+from opspace.law.press_columns import GIVEN, GIVEN_AT
 from opspace.robots.protocol import Robot
 from opspace.stack import Member
 from opspace.tasks import ForceTask
+from opspace.tasks.touch_memory import TouchMemory
 from opspace.tasks.validation import Array, finite_array
 
+STALE = int(Status.WRENCH_STALE)
+TAKEN = slice(GIVEN, GIVEN + 6)
 FROZEN = ~(Status.OK | Status.DIRECTION_OFF | Status.LATE)
 """What keeps the integrals of forces where they are."""
 
@@ -27,9 +32,6 @@ of the frame; None where nothing new has been measured since the tick before."""
 
 class WrenchInput:
     """Hands measured wrenches to force tasks, and tells them what has saturated.
-
-    Attributes:
-        given: What was given in the last tick, by name of the frame.
 
     Args:
         robot: The robot.
@@ -42,7 +44,17 @@ class WrenchInput:
         self._members: Sequence[Member] | None = None
         self._present: list[tuple[ForceTask, str]] = []
         self._away: list[tuple[weakref.ref[ForceTask], str]] = []
-        self.given: Mapping[str, Array | None] = {}
+        self._only: tuple[str, TouchMemory, Array, Any] | None = None
+        self._given: Mapping[str, Array | None] | None = {}
+        self._taken: tuple[str, list[float]] = "", []
+
+    @property
+    def given(self) -> Mapping[str, Array | None]:
+        """What was given in the last tick, by name of the frame."""
+        if self._given is None:
+            sensor, found = self._taken
+            self._given = {sensor: np.array(found)}
+        return self._given
 
     def add(self, task: ForceTask) -> None:
         """Let a task have its wrench from now on."""
@@ -50,7 +62,7 @@ class WrenchInput:
             self._tasks = [ref for ref in self._tasks if ref() is not None] + [weakref.ref(task)]
             self._members = None
 
-    def take(self, t: float, wrenches: Wrenches | None, members: Sequence[Member]) -> Status:
+    def take(self, t: float, wrenches: Wrenches | None, members: Sequence[Member]) -> int:
         """Check the wrenches of a tick and hand them out.
 
         Args:
@@ -59,16 +71,32 @@ class WrenchInput:
             members: The tasks of the tick.
 
         Returns:
-            ``WRENCH_STALE`` where a task of the tick has had no new one for too long.
+            The number of ``WRENCH_STALE`` where a task of the tick has had no new one for too long,
+            or 0.
 
         Raises:
             InputError: A task of the tick lacks its wrench, or one is no (6,) finite numbers.
             UnknownNameError: There is no frame of this name.
         """
-        given = {name: self._checked(name, value) for name, value in (wrenches or {}).items()}
         if members is not self._members:
             self._look_at(members)
-        status = Status.OK
+        # One task and its wrench, as nearly always: the same checks in a fraction of the time. What
+        # does not pass them goes the long way, which says what is wrong.
+        if self._only is not None and type(wrenches) is dict and len(wrenches) == 1:
+            sensor, memory, row, numbers = self._only
+            value = wrenches.get(sensor)
+            if type(value) is ndarray and memory.row is row:
+                try:
+                    found = value.tolist()
+                    if isfinite(sum(found)):
+                        numbers[TAKEN] = value  # refuses other shapes and kinds of numbers
+                        numbers[GIVEN_AT] = t
+                        self._given, self._taken = None, (sensor, found)
+                        return 0
+                except (TypeError, ValueError, NotImplementedError):
+                    pass
+        given = {name: self._checked(name, value) for name, value in (wrenches or {}).items()}
+        status = 0
         for task, sensor in self._present:
             if sensor not in given:
                 raise InputError(self._missing(task, given))
@@ -77,11 +105,12 @@ class WrenchInput:
                     raise InputError(
                         f"task {task.name!r}: the wrench of {sensor!r} has never been measured"
                     )
-                status = Status.WRENCH_STALE
+                status = STALE
         for ref, sensor in self._away:
             if sensor in given and (away := ref()) is not None:
                 away.take(t, given[sensor])
-        self.given = given
+        self._given = given
+        self._look_for_one()
         return status
 
     def _look_at(self, members: Sequence[Member]) -> None:
@@ -91,6 +120,18 @@ class WrenchInput:
         self._present = [one for one in known if id(one[0]) in present]
         self._away = [(weakref.ref(one), name) for one, name in known if id(one) not in present]
         self._members = members
+        self._look_for_one()
+
+    def _look_for_one(self) -> None:
+        """Find out whether a single task asks for its wrench, and where it keeps it."""
+        self._only = None
+        if len(self._present) != 1 or self._away:
+            return
+        task, sensor = self._present[0]
+        if type(task).take is ForceTask.take:
+            row = task.memory.row
+            view: Any = memoryview(cast(Any, row))
+            self._only = sensor, task.memory, row, view
 
     def after(self, status: Status) -> None:
         """Tell force tasks whether anything saturated, so that their integrals do not wind up."""

@@ -254,7 +254,8 @@ class Plan:
     def remember(self) -> None:
         """Be where force tasks remember their contacts from now on, wherever they did before."""
         for force in self.forces:
-            force.keep()
+            if force.task.memory.row is not force.memory:
+                force.keep()
 
     def forget_ways(self) -> None:
         """Let all angles take the short way at the next tick."""

@@ -130,6 +130,7 @@ def _plant(
             friction=option.friction,
             torque_limits=option.torque_limits,
             surfaces=[surface.build() for surface in option.surfaces],
+            holes=[hole.build() for hole in option.holes],
             disturbances=Disturbances(
                 mass_error=option.mass_error,
                 dry_friction=option.dry_friction,

@@ -18,6 +18,7 @@ from opspace.scenario.touches import join_touches
 from opspace.tasks import TASK_KINDS, PoseReference, PostureTask, Task
 from opspace.tasks.joint_layout import joint_layout
 from opspace.tasks.motion_task import MotionTask
+from opspace.tasks.quantities import Pose
 from opspace.tasks.tracking import TrackingTask
 from opspace.tasks.validation import Array
 
@@ -114,6 +115,9 @@ def _target(task: TrackingTask, entry: TaskEntry, robot: Robot) -> Any:
     position, rotation = vectors(found.position), rotations(found.rotation)
     if controls == "pose":
         return _pose(entry.target, position, rotation)
+    if isinstance(task.quantity, Pose) and entry.target is not None:
+        led = as_reference(build_target(entry.target, position), position)
+        return PoseReference(led, as_reference(None, rotation))
     return build_target(entry.target, position if controls == "position" else rotation)
 
 

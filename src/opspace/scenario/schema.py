@@ -14,7 +14,7 @@ from opspace.scenario.document import Document, Key, key_text
 from opspace.scenario.events import Event, ProfileName, check_events
 from opspace.scenario.fields import Checked, Entry, Number, listed, problem, shown, whole
 from opspace.scenario.obstacle_entries import CollisionsEntry
-from opspace.scenario.surface_entries import SurfaceEntry
+from opspace.scenario.surface_entries import HoleEntry, SurfaceEntry
 from opspace.scenario.targets import Configuration
 from opspace.scenario.task_entries import AnyTask
 
@@ -136,6 +136,10 @@ class PlantEntry(Entry):
     )
     surfaces: list[SurfaceEntry] = Field(
         default_factory=list, description="what the tool may press; the wrench there is measured"
+    )
+    holes: list[HoleEntry] = Field(
+        default_factory=list,
+        description="holes that a peg on the tool may be put into; the wrench there is measured",
     )
     wrench_noise: Annotated[float, Number("N", at_least=0.0)] = Field(
         default=0.0,

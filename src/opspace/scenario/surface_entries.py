@@ -8,6 +8,7 @@ from pydantic import Field, model_validator
 
 from opspace.scenario.fields import Entry, Number, problem
 from opspace.scenario.targets import Point
+from opspace.sim.hole import Hole
 from opspace.sim.surfaces import Surface
 from opspace.tasks import DistanceBuffer
 
@@ -51,6 +52,40 @@ class SurfaceEntry(Entry):
         if given["size"] is None:
             del given["size"]
         return Surface(**given)
+
+
+class HoleEntry(Entry):
+    """A round hole in a plate, and the round peg on the tool that it is for."""
+
+    point: Point = Field(description="middle of its mouth [m]")
+    normal: Annotated[tuple[float, ...], Number("1", size=3)] = Field(
+        default=(0.0, 0.0, 1.0), description="direction out of it"
+    )
+    diameter: Annotated[float, Number("m", above=0.0)] = Field(
+        default=0.02, description="of the peg, which ends at the tool [m]"
+    )
+    clearance: Annotated[float, Number("m", above=0.0)] = Field(
+        default=1e-4, description="what the hole is wider by, in diameter [m]"
+    )
+    depth: Annotated[float, Number("m", above=0.0)] = Field(
+        default=0.02, description="from the mouth to the bottom [m]"
+    )
+    chamfer: Metres = Field(default=1e-3, description="width of the chamfer at the mouth [m]")
+    stiffness: Stiffness = Field(default=1e5, description="with which it pushes back [N/m]")
+    friction: Annotated[float, Number("1", at_least=0.0)] = Field(
+        default=0.1, description="part of the normal force that rubs"
+    )
+    damping: Annotated[float, Number("N·s/m", at_least=0.0)] = Field(
+        default=50.0, description="of the motion into what is touched [N·s/m]"
+    )
+
+    def build(self) -> Hole:
+        """Make the hole.
+
+        Raises:
+            InputError: A normal that points nowhere, or a chamfer as deep as the hole.
+        """
+        return Hole(**{key: getattr(self, key) for key in type(self).model_fields})
 
 
 class NearEntry(Entry):

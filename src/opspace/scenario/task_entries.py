@@ -192,24 +192,22 @@ _CONTROLLED: Mapping[str, Mapping[str, _Argument]] = {
 }
 
 
-def _check_three(value: float | tuple[float, ...]) -> float | tuple[float, ...]:
-    if isinstance(value, tuple) and len(value) != 3:
-        raise problem(f"must be a number or a list of 3 numbers, not {len(value)}")
+def _check_blocks(value: float | tuple[float, ...]) -> float | tuple[float, ...]:
+    if isinstance(value, tuple) and len(value) not in (3, 6):
+        raise problem(f"must be a number or a list of 3 or 6 numbers, not {len(value)}")
     return value
 
 
+_BLOCKS = AfterValidator(_check_blocks)
 _IMPEDANCE: Mapping[str, _Argument] = {
     "stiffness": _Argument(
-        Annotated[
-            float | tuple[float, ...],
-            Number("N/m", at_least=0.0, size="rows"),
-            AfterValidator(_check_three),
-        ],
-        "stiffness [N/m], a number or one per axis",
+        Annotated[float | tuple[float, ...], Number("N/m", at_least=0.0, size="rows"), _BLOCKS],
+        "stiffness [N/m], a number or one per axis; with six numbers, the last three in N·m/rad, "
+        "the orientation at the start is held as well",
     ),
     "force": _Argument(
-        _nullable(Annotated[tuple[float, ...], Number("N", size=3)]),
-        "force beside the spring's [N]; null is none",
+        _nullable(Annotated[tuple[float, ...], Number("N", size="any"), _BLOCKS]),
+        "force beside the spring's [N], with six numbers of stiffness [N, N·m]; null is none",
     ),
 }
 _PLAIN: Mapping[Any, Any] = {float: Annotated[float, Number("1")], bool: bool, str: str}

@@ -12,6 +12,7 @@ from opspace.scenario.surface_entries import ActivationEntry
 from opspace.tasks import ActivationUnion, Contact, ForceTask, GiveWay, Task
 from opspace.tasks.contact import HardContact
 from opspace.tasks.motion_task import MotionTask
+from opspace.tasks.quantities import Pose
 
 
 def join_touches(scenario: Scenario, robot: Robot, tasks: Mapping[str, Task]) -> None:
@@ -47,6 +48,11 @@ def join_touches(scenario: Scenario, robot: Robot, tasks: Mapping[str, Task]) ->
         pressing = getattr(entry, "give_way", None)
         if pressing is not None and isinstance(task, MotionTask):
             found = force(("tasks", name, "give_way"), pressing)
+            if isinstance(task.quantity, Pose):
+                raise scenario.error(
+                    ("tasks", name, "give_way"),
+                    "is for a position; a spring of six numbers gives way with a stiffness of 0",
+                )
             held = task.source.measure(robot).position
             task.target = GiveWay(held if task.target is None else task.target, found)
 
@@ -65,9 +71,10 @@ def _joined(
 def _check_world(scenario: Scenario, robot: Robot, forces: Mapping[str, ForceTask]) -> None:
     """Refuse what would never be measured."""
     for name, task in forces.items():
-        if not scenario.plant.surfaces:
+        if not (scenario.plant.surfaces or scenario.plant.holes):
             raise scenario.error(
-                ("tasks", name), "presses on nothing: the plant has no surfaces, so no wrench"
+                ("tasks", name),
+                "presses on nothing: the plant has no surfaces and no holes, so no wrench",
             )
         if task.sensor != robot.tool:
             raise scenario.error(

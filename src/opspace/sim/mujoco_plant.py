@@ -13,6 +13,7 @@ from opspace.robots.adapter import spread_of
 from opspace.robots.motor_range import motor_range
 from opspace.sim.disturbances import NO_DISTURBANCES, Disturbances, Hand, Wire
 from opspace.sim.ground import Ground
+from opspace.sim.hole import Hole
 from opspace.sim.surfaces import Surface, TouchedWorld
 
 if TYPE_CHECKING:
@@ -46,8 +47,9 @@ class Plant:
         disturbances: What the controller's model does not know.
         ground: What a robot with a floating base stands on; None is nothing.
         surfaces: What the tool may touch; the wrench there is measured.
-        substeps: Steps of the simulation in each time step; None is 1, or with surfaces as many
-            as make them at most 0.25 ms.
+        holes: Holes that a peg on the tool may be put into; the wrench there is measured.
+        substeps: Steps of the simulation in each time step; None is 1, or where something may be
+            touched as many as make them at most 0.25 ms.
 
     Raises:
         MissingExtraError: MuJoCo is not installed.
@@ -68,11 +70,12 @@ class Plant:
         disturbances: Disturbances = NO_DISTURBANCES,
         ground: Ground | None = None,
         surfaces: Sequence[Surface] = (),
+        holes: Sequence[Hole] = (),
         substeps: int | None = None,
     ) -> None:
         if not (math.isfinite(dt) and dt > 0.0):
             raise InputError(f"the time step must be above 0 s, got {dt}")
-        self._substeps = _checked_substeps(substeps, dt, bool(surfaces))
+        self._substeps = _checked_substeps(substeps, dt, bool(surfaces or holes))
         mujoco = _import_mujoco()
         from opspace.robots.mujoco_model import model_of  # noqa: PLC0415 - imports mujoco
 
@@ -112,7 +115,7 @@ class Plant:
         self._wire = Wire(round(disturbances.delay / dt))
         self._hand = Hand(robot, disturbances.pushes)
         self._sensors = disturbances.sensors()
-        self._world = TouchedWorld(robot, surfaces)
+        self._world = TouchedWorld(robot, surfaces, holes)
         self._wrist = disturbances.wrist(dt)
         self.data = mujoco.MjData(self.model)
         if disturbances.mass_error:
@@ -193,22 +196,27 @@ class Plant:
         """Measure the wrench of the tool on what it touches, as `opspace.Controller.step` takes it.
 
         Returns:
-            (6,) N and N·m in world axes, by name of the tool; nothing where there are no surfaces.
+            (6,) N and N·m in world axes, by name of the tool; nothing where nothing may be touched.
         """
-        if not self._world.surfaces:
+        if not self._world:
             return {}
         self._world.torque(self.q, self.v)
         return {self._world.name: self._wrist.read(self._world.wrench)}
 
     @property
+    def holes(self) -> tuple[Hole, ...]:
+        """The holes that there are."""
+        return self._world.holes
+
+    @property
     def exerted(self) -> np.ndarray:
         """Wrench of the tool on what it touches as it is, (6,) N and N·m in world axes."""
-        if self._world.surfaces:
+        if self._world:
             self._world.torque(self.q, self.v)
         return self._world.wrench.copy()
 
     def _step(self, given: np.ndarray) -> None:
-        if self._world.surfaces:
+        if self._world:
             q, v = self._own(self.data.qpos), self._own(self.data.qvel)
             given = given + self._world.torque(q, v)
         if self._spread is None:

@@ -13,6 +13,7 @@ from opspace.errors import InputError
 
 if TYPE_CHECKING:
     from opspace.robots.protocol import Robot
+    from opspace.sim.hole import Hole
 
 CREEP = 1e-3
 """Speed along a surface up to which friction grows, m/s."""
@@ -98,26 +99,44 @@ class Surface:
 
 
 class TouchedWorld:
-    """The surfaces around one point of a robot.
+    """What is around one point of a robot.
 
     Args:
         robot: The robot; it is left alone.
-        surfaces: What it may touch.
+        surfaces: What its point may touch.
+        holes: Holes for a peg that ends there.
         frame: Name of the frame whose origin touches; None is the tool.
     """
 
-    def __init__(self, robot: Robot, surfaces: Sequence[Surface], frame: str | None = None) -> None:
-        self.surfaces = tuple(surfaces)
+    def __init__(
+        self,
+        robot: Robot,
+        surfaces: Sequence[Surface],
+        holes: Sequence[Hole] = (),
+        frame: str | None = None,
+    ) -> None:
+        self.surfaces, self.holes = tuple(surfaces), tuple(holes)
         self.name = robot.tool if frame is None else frame
-        self._robot = robot.fresh() if self.surfaces else robot
+        self._robot = robot.fresh() if self else robot
         self._frame = robot.frame_id(self.name)
         self.wrench = np.zeros(6)
 
+    def __bool__(self) -> bool:
+        """Whether there is anything."""
+        return bool(self.surfaces or self.holes)
+
     def torque(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
-        """Return Jᵀ F of the surfaces, (n,) N·m, and keep what the robot exerts on them."""
+        """Return Jᵀ F of all that is touched, (n,) N·m, and keep what the robot exerts on it."""
         robot, frame = self._robot, self._frame
         robot.update(q, v)
-        x, speed = robot.position(frame), robot.velocity(frame)[:3]
-        force = np.sum([surface.force(x, speed) for surface in self.surfaces], axis=0)
+        x, twist, J = robot.position(frame), robot.velocity(frame), robot.jacobian(frame)
+        force, torque = np.zeros(3), np.zeros(robot.nv)
+        if self.surfaces:
+            force = np.sum([surface.force(x, twist[:3]) for surface in self.surfaces], axis=0)
+            torque = J[:3].T @ force
         self.wrench = np.concatenate([-force, np.zeros(3)])
-        return robot.jacobian(frame)[:3].T @ force
+        for hole in self.holes:
+            wrench = hole.wrench(x, robot.rotation(frame), twist)
+            self.wrench -= wrench
+            torque = torque + J.T @ wrench
+        return torque

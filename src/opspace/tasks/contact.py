@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from opspace.errors import InputError
 from opspace.law.press_columns import CONFIDENCE
-from opspace.law.scalars import FOLLOW, lag, passed
+from opspace.law.scalars import FALL, FOLLOW, lag, passed
 from opspace.tasks.references.sample import Constant, Reference, Sample
 from opspace.tasks.references.start import begun
 from opspace.tasks.validation import Array
@@ -18,6 +18,10 @@ from opspace.tasks.validation import Array
 if TYPE_CHECKING:
     from opspace.robots.protocol import Robot
     from opspace.tasks.force import ForceTask
+
+
+TURNED = 0.9
+"""Cosine of a turn of the force from one tick to the next that is no turn of the tool."""
 
 
 class Contact:
@@ -69,7 +73,9 @@ class GiveWay:
         δ̇ = −c nᵀ ṗ + c (nᵀ (x − p) − δ)/τ,        τ = `opspace.law.scalars.FOLLOW`
 
     so that it is where the tool is when the touch ends. It goes by what the force task knew in the
-    tick before, like which it remembers; asked again at the same time it answers the same.
+    tick before, like which it remembers; asked again at the same time it answers the same. While the
+    force task is not asked, c fades as that of a lost touch does and the shift stays; where n turns
+    at once, as when a force changes its sign, what there is of the shift stays where it is.
 
     Args:
         reference: (3,) m, or a reference of a position.
@@ -80,7 +86,11 @@ class GiveWay:
         self.reference: Reference = reference if callable(reference) else Constant(reference)
         self.task = task
         self._t = -math.inf
+        self._c = 0.0
+        self._left = 0.0  # of the confidence, since the task was last asked
+        self._n = np.zeros(3)
         self._shift = 0.0
+        self._kept = np.zeros(3)
         self._before: Array | None = None
         self._now: Array | None = None
 
@@ -91,19 +101,31 @@ class GiveWay:
     def __call__(self, t: float, /) -> Sample:
         """Return the desired motion at time t, s."""
         x, v, a = self.reference(t)
-        known = self.task.memory.before(t)
-        if known is None:
-            return Sample(x, v, a)
-        c, travel, n = known
-        dt = passed(t, self._t)
         if t != self._t:
-            self._t, self._before, self._now = t, self._now, x
-        if dt > 0.0 and self._before is not None:
-            ahead = float(n @ v) if v.size else 0.0
-            away = travel - float(n @ self._before) - self._shift
-            self._shift += c * (lag(dt, FOLLOW) * away - dt * ahead)
+            self._follow(t, x, v)
+        c, n = self._c, self._n
         v = v - c * (n @ v) * n if v.size else v
-        return Sample(x + self._shift * n, v, a - c * (n @ a) * n if a.size else a)
+        return Sample(x + self._kept + self._shift * n, v, a - c * (n @ a) * n if a.size else a)
+
+    def _follow(self, t: float, x: Array, v: Array) -> None:
+        """Bring the shift from the tick before up to time t."""
+        dt = passed(t, self._t)
+        known = self.task.memory.before(t) if self.task.memory.asked_since(self._t) else None
+        self._t, self._before, self._now = t, self._now, x
+        self._left *= 1.0 - lag(dt, FALL)
+        if known is not None and known[2].any():  # a task that begins in this tick knows nothing
+            c, travel, n = known
+            if n @ self._n < TURNED:
+                self._kept, self._shift = self._kept + self._shift * self._n, 0.0
+            self._left = self._left if c < self._left else 0.0
+            self._c, self._n = max(c, self._left), n
+            if dt > 0.0 and self._before is not None:
+                away = travel - float(n @ (self._before + self._kept)) - self._shift
+                self._shift += self._c * lag(dt, FOLLOW) * away
+        else:
+            self._left = self._c = (1.0 - lag(dt, FALL)) * self._c
+        if dt > 0.0 and v.size:
+            self._shift -= self._c * dt * float(self._n @ v)
 
 
 def checked_thresholds(

@@ -96,6 +96,10 @@ class TouchMemory:
             self[at.TRAVEL],
         )
 
+    def asked_since(self, t: float) -> bool:
+        """Whether a tick at time ``t`` [s] or later has been learnt from."""
+        return self.row[at.BEGUN] != 0.0 and bool(self.row[at.WHEN] >= t)
+
     def before(self, t: float) -> tuple[float, float, Array] | None:
         """Confidence, travel [m] and direction (3,) in the last tick before time ``t`` [s], if any."""
         if not self.row[at.BEGUN]:
