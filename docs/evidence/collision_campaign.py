@@ -115,7 +115,7 @@ def one_start(kind, seed):
         aside = np.array([0.0, BESIDE, 0.0])
         shapes = shapes_and_pairs("ur5")["shapes"]
         others = [
-            osc.OtherRobot(osc.load_robot("ur5"), sign * aside, shapes=shapes)
+            osc.OtherRobot(osc.load_robot("ur5"), sign * aside, shapes=shapes, share=0.5)
             for sign in (1.0, -1.0)
         ]
         made = [arm("ur5", rng, other.obstacles) for other in others]

@@ -43,8 +43,7 @@ def test_from_random_starts_nothing_comes_nearer_unless_it_is_said(monkeypatch, 
     runs = [campaign.one_start(kind, seed) for seed in range(STARTS)]
     runs = [run for run in runs if run.ticks]
     assert len(runs) >= 0.5 * STARTS
-    # Of two arms neither knows how the other accelerates.
+    # Of two arms each keeps its own balls from the other's capsules.
     slack = 1e-3 if kind == campaign.TWO else 1e-4
     assert min(run.least for run in runs) >= 0.01 - slack
-    often = 0.5 if kind == campaign.TWO else 0.05
-    assert sum(run.lost for run in runs) <= often * len(runs) + 1
+    assert sum(run.lost for run in runs) <= 0.05 * len(runs) + 1

@@ -54,9 +54,12 @@ def cluttered(seed):
     place = lambda: reference_tool() + rng.uniform(-0.3, 0.3, 3)  # noqa: E731
     turn = rng.normal(size=4)
     turn /= np.linalg.norm(turn)
+    ball = osc.Ball(rng.uniform(0.02, 0.1), place(), velocity=rng.normal(size=3))
+    link = osc.Capsule(0.03, 0.3, place(), turn, velocity=rng.normal(size=6))
+    ball.share, link.share = 0.5, 0.3  # of another robot, which keeps away with the rest
     return (
-        osc.Ball(rng.uniform(0.02, 0.1), place(), velocity=rng.normal(size=3)),
-        osc.Capsule(0.03, 0.3, place(), turn, velocity=rng.normal(size=6)),
+        ball,
+        link,
         osc.Box(rng.uniform(0.05, 0.3, 3), place(), turn, velocity=rng.normal(size=6)),
         osc.HalfSpace(place() - [0, 0, 0.3], rng.normal(size=3) + [0, 0, 2.0]),
     )

@@ -59,6 +59,9 @@ def test_wrong_states_are_refused():
             other.follow(q, np.zeros(6))
     with pytest.raises(osc.InputError, match="no shapes"):
         osc.OtherRobot(osc.load_robot("puma560"), shapes=[])
+    for share in (0.0, 1.0, np.nan):
+        with pytest.raises(osc.InputError, match="share of 'other'"):
+            osc.OtherRobot(osc.load_robot("puma560"), shapes=SHAPES, share=share)
 
 
 APART = 0.9
@@ -73,7 +76,8 @@ def reached(seed, seconds=1.5, guarded=True):
         robot = osc.load_robot("puma560")
         arms.append((robot, robot.fresh()))
     others = [
-        osc.OtherRobot(arms[1 - i][0], bases[1 - i] - bases[i], shapes=SHAPES) for i in (0, 1)
+        osc.OtherRobot(arms[1 - i][0], bases[1 - i] - bases[i], shapes=SHAPES, share=0.5)
+        for i in (0, 1)
     ]
     controllers = []
     for (robot, model), other in zip(arms, others, strict=True):
@@ -115,7 +119,7 @@ def reached(seed, seconds=1.5, guarded=True):
 def test_two_arms_that_want_to_be_in_the_same_place_stay_apart():
     least, lost = reached(0)
     assert not lost
-    # Neither knows how the other accelerates.
+    # Balls of one against capsules of the other are not the rows that the other keeps.
     assert least >= 0.01 - 1e-3
     assert least <= 0.05
     assert reached(0, guarded=False)[0] < 0.0

@@ -126,13 +126,14 @@ def test_an_obstacle_that_comes_late_is_told(tmp_path):
 
 def test_a_header_describes_an_obstacle_as_it_is(tmp_path):
     controller = arm(ReferenceController)
+    controller.collisions["ball"].share = 0.4
     osc.TickRecorder(tmp_path / "run", controller, {}).close()
     about = osc.load(tmp_path / "run").header["collisions"]
     for one in controller.collisions.obstacles:
         two = recorded_obstacle(one.name, about["obstacles"][one.name])
         assert np.array_equal(one.lower, two.lower)
         assert np.array_equal(one.upper, two.upper)
-        assert (one.radius, one.ignore) == (two.radius, two.ignore)
+        assert (one.radius, one.ignore, one.share) == (two.radius, two.ignore, two.share)
 
 
 def test_who_replays_without_a_guard_is_told(tmp_path):

@@ -14,7 +14,7 @@ from opspace.errors import InputError
 from opspace.kernels.columns import KEEP_TORQUE
 from opspace.law import nearest_acceleration
 from opspace.law.convex import box_distance
-from opspace.law.scalars import admissible_command, level_weight
+from opspace.law.scalars import closing_command, level_weight
 from opspace.machine.field_table import Record
 from opspace.plan.plan import Plan
 from opspace.tasks import CollisionAvoidance
@@ -225,8 +225,11 @@ def _distances(
     n = np.einsum("kij,ki->kj", R, n)
     v = ball[:, 3:6] - motion[:, :3] - np.cross(motion[:, 3:6], ball[:, :3])
     D, rate = np.array(tick.distance) - guard.margin, np.einsum("ki,ki->k", n, v)
+    share = d.share[sets]
+    own = np.where(share > 0.0, np.einsum("ki,ki->k", n, ball[:, 3:6]), rate)
+    told = zip(D.tolist(), rate.tolist(), own.tolist(), share.tolist(), strict=True)
     asked = [
-        admissible_command(x, -y, guard.brake, np.inf, guard.k1, guard.k2, 0.0, 0.0)
-        for x, y in zip(D.tolist(), rate.tolist(), strict=True)
+        closing_command(x, -y, -part, s or 1.0, guard.brake, guard.k1, guard.k2)
+        for x, y, part, s in told
     ]
     return D, rate, np.array(d.most) - asked

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from opspace.law.convex import Bodies, DistanceRows, Points, distance_rows
-from opspace.law.scalars import admissible_command
+from opspace.law.scalars import closing_command
 from opspace.robots.protocol import Robot
 from opspace.tasks.collision_avoidance import CollisionAvoidance
 from opspace.tasks.distance_layout import DistanceLayout
@@ -45,12 +45,22 @@ def distance_terms(guard: CollisionAvoidance, robot: Robot, t: float) -> Distanc
     rows = rows_of(layout, robot, placings)
     balls, sets = layout.rows[:, 0], layout.rows[:, 1]
     distance = rows.distance - layout.ball_radius[balls] - layout.set_radius[sets]
-    D = distance - guard.margin
+    most = _most(guard, distance - guard.margin, rows, layout.share[sets])
+    return DistanceTerms(layout, placings, distance, -rows.G, most)
+
+
+def _most(
+    guard: CollisionAvoidance, D: np.ndarray, rows: DistanceRows, share: np.ndarray
+) -> np.ndarray:
+    """Say how fast each distance may shrink faster, (rows,) m/s²."""
+    shared = share > 0.0
+    own = np.where(shared, rows.own_rate, rows.rate)
+    told = zip(D.tolist(), rows.rate.tolist(), own.tolist(), share.tolist(), strict=True)
     most = [
-        admissible_command(d, -rate, guard.brake, np.inf, guard.k1, guard.k2, 0.0, 0.0) + drift
-        for d, rate, drift in zip(D.tolist(), rows.rate.tolist(), rows.drift.tolist(), strict=True)
+        closing_command(d, -rate, -part, s or 1.0, guard.brake, guard.k1, guard.k2)
+        for d, rate, part, s in told
     ]
-    return DistanceTerms(layout, placings, distance, -rows.G, np.array(most))
+    return np.array(most) + np.where(shared, rows.own_drift, rows.drift)
 
 
 def rows_of(layout: DistanceLayout, robot: Robot, placings: Sequence[Placing]) -> DistanceRows:

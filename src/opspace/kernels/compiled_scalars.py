@@ -23,6 +23,7 @@ _COMPILED = _compiled()
 profile = _COMPILED["profile"]
 ramp = _COMPILED["ramp"]
 admissible_command = _COMPILED["admissible_command"]
+closing_command = _COMPILED["closing_command"]
 limit_command = _COMPILED["limit_command"]
 limit_presence = _COMPILED["limit_presence"]
 stopping_command = _COMPILED["stopping_command"]

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 
-from opspace.kernels.compiled_scalars import admissible_command
+from opspace.kernels.compiled_scalars import closing_command
 from opspace.kernels.motion import cross_add, move_joints
-from opspace.law.scalars import NO_DISTANCE
+from opspace.law.scalars import NO_DISTANCE, ROUNDED
 from opspace.machine.jit import jit
 
 MARGIN, K1, K2, BRAKE = range(4)
@@ -95,21 +95,51 @@ def _bound(work, d, i, ball, of):
     ay = ball[7] - m[7] - (m[11] * px - m[9] * pz) - (wz * ux - wx * uz)
     az = ball[8] - m[8] - (m[9] * py - m[10] * px) - (wx * uy - wy * ux)
     rate, drift = nx * vx + ny * vy + nz * vz, nx * ax + ny * ay + nz * az
-    if extent[0] == extent[3] and extent[1] == extent[4] and extent[2] == extent[5]:
-        sideways = max(vx * vx + vy * vy + vz * vz - rate * rate, 0.0)
-        drift += sideways / max(rho, NO_DISTANCE)
+    curved = _curved(x, extent, rho, nx, ny, nz, vx - rate * nx, vy - rate * ny, vz - rate * nz)
     work.distance[i] = rho - d.ball[d.row[i, 0], 3] - extent[6]
-    d.most[i] = drift + admissible_command(
-        work.distance[i] - d.limits[MARGIN],
-        -rate,
-        d.limits[BRAKE],
-        math.inf,
-        d.limits[K1],
-        d.limits[K2],
-        0.0,
-        0.0,
-    )
-    G = d.G[i]
+    share, own = d.share[of], rate
+    if share > 0.0:
+        own = nx * ball[3] + ny * ball[4] + nz * ball[5]
+        drift = nx * ball[6] + ny * ball[7] + nz * ball[8]
+        drift += min(_turning(m, rho, nx, ny, nz, vx, vy, vz) + curved, 0.0)
+    else:
+        share = 1.0
+        drift += curved
+    D = work.distance[i] - d.limits[MARGIN]
+    brake, k1, k2 = d.limits[BRAKE], d.limits[K1], d.limits[K2]
+    d.most[i] = drift + closing_command(D, -rate, -own, share, brake, k1, k2)
+    _row(work, d, i, of, nx, ny, nz)
+
+
+@jit
+def _curved(x, extent, rho, nx, ny, nz, ux, uy, uz):
+    """What the set curves away from a ball that moves along it at u, as far as it does not step."""
+    total = 0.0
+    for c in range(3):
+        a, b, e = x[3 * c], x[3 * c + 1], x[3 * c + 2]
+        part = 1.0
+        if extent[c] != extent[3 + c]:
+            part = min(abs(a * nx + b * ny + e * nz) / ROUNDED, 1.0)
+        along = a * ux + b * uy + e * uz
+        total += part * along * along
+    return total / max(rho, NO_DISTANCE)
+
+
+@jit
+def _turning(m, rho, nx, ny, nz, vx, vy, vz):
+    """What a set that turns adds beside the acceleration of its nearest point."""
+    wx, wy, wz = m[3], m[4], m[5]
+    cx, cy, cz = wy * nz - wz * ny, wz * nx - wx * nz, wx * ny - wy * nx
+    # n · (ω × v) = −v · (ω × n).
+    aside = vx * cx + vy * cy + vz * cz
+    return max(rho, 0.0) * (cx * cx + cy * cy + cz * cz) + 2.0 * aside
+
+
+@jit
+def _row(work, d, i, of, nx, ny, nz):
+    """By how much accelerations of the joints let the distance shrink faster."""
+    ball, G = d.ball_motion[d.row[i, 0]], d.G[i]
+    px, py, pz = ball[0], ball[1], ball[2]
     for a in range(G.shape[0]):
         G[a] = 0.0
     cx, cy, cz = py * nz - pz * ny, pz * nx - px * nz, px * ny - py * nx

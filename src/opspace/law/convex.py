@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float
 
-from opspace.law.scalars import NO_DISTANCE
+from opspace.law.scalars import NO_DISTANCE, ROUNDED
 
 
 class Points(NamedTuple):
@@ -57,12 +57,17 @@ class DistanceRows(NamedTuple):
         rate: (k,) ρ̇, m/s.
         G: (k, n) by how much an acceleration of the joints changes it, 1 or m.
         drift: (k,) m/s².
+        own_rate: (k,) the part of ρ̇ that the point has, n · v_p, m/s.
+        own_drift: (k,) what is left of ``drift`` where what the set accelerates by is counted on its
+            side, m/s².
     """
 
     distance: Float[np.ndarray, " k"]
     rate: Float[np.ndarray, " k"]
     G: Float[np.ndarray, "k n"]
     drift: Float[np.ndarray, " k"]
+    own_rate: Float[np.ndarray, " k"]
+    own_drift: Float[np.ndarray, " k"]
 
 
 def box_distance(
@@ -105,6 +110,13 @@ def distance_rows(
     the distance to a convex set is a convex function: what the inequality leaves out is not negative,
     and zero where the set is flat. Of a set that is a point it is known, |v_t|²/ρ, and counted.
 
+    Where two bodies keep away from each other, each counts what its own points accelerate by. The
+    acceleration of B at p is that of its nearest point, a_P, and what B's turning adds:
+
+        ρ̈ ≥ n · a_p − n · a_P + ρ |ω_B × n|² − 2 n · (ω_B × v_rel)
+
+    The last two terms are for p where they are negative, and nobody's where they help.
+
     Args:
         points: The points p.
         bodies: The bodies B that the sets are fixed to.
@@ -122,9 +134,15 @@ def distance_rows(
     carried = bodies.acceleration[:, :3] + np.cross(bodies.acceleration[:, 3:], way)
     a = points.acceleration - carried - np.cross(spin, np.cross(spin, way) + 2.0 * v)
     rate, drift = np.einsum("ki,ki->k", n, v), np.einsum("ki,ki->k", n, a)
-    sideways = np.maximum(np.einsum("ki,ki->k", v, v) - rate * rate, 0.0)
-    round_ = np.all(lower == upper, axis=1)
-    drift = drift + np.where(round_, sideways / np.maximum(distance, NO_DISTANCE), 0.0)
+    local = np.stack([n, v - rate[:, None] * n])
+    n_axes, tangent = np.einsum("kji,skj->ski", bodies.rotation, local)
+    round_ = np.where(lower == upper, 1.0, np.minimum(np.abs(n_axes) / ROUNDED, 1.0))
+    curved = np.sum(round_ * tangent**2, axis=1) / np.maximum(distance, NO_DISTANCE)
+    drift = drift + curved
+    across = np.sum(np.cross(spin, n) ** 2, axis=1)
+    turning = np.maximum(distance, 0.0) * across - 2.0 * np.einsum("ki,ki->k", n, np.cross(spin, v))
+    own_drift = np.einsum("ki,ki->k", n, points.acceleration) + np.minimum(turning + curved, 0.0)
+    own_rate = np.einsum("ki,ki->k", n, points.velocity)
     straight = np.einsum("ki,kij->kj", n, points.J - bodies.J[:, :3])
     G = straight - np.einsum("ki,kij->kj", np.cross(way, n), bodies.J[:, 3:])
-    return DistanceRows(distance, rate, G, drift)
+    return DistanceRows(distance, rate, G, drift, own_rate, own_drift)

@@ -247,6 +247,13 @@ class LimitLaw(NamedTuple):
         ]
 
 
+EASE = 1.5
+"""What is left of an admissible speed where distances may already change twice as fast, m/s."""
+
+ROUNDED = 0.3
+"""Part of a direction along an axis of a box from which on the edge there counts as round."""
+
+
 def allowed_speed(d: float, brake: float, k1: float) -> tuple[float, float]:
     """Evaluate v_adm(d), from which a joint still stops within d, and its slope dv_adm/dd."""
     if d < 0.0:
@@ -266,6 +273,22 @@ def admissible_command(
     """Evaluate q̈_adm at distance d and speed ``towards``, for the largest speed ``most``."""
     allowed, slope = allowed_speed(d, brake, k1)
     return min(-towards * slope + k2 * (allowed - towards), k2 * (most - towards))
+
+
+def closing_command(
+    d: float, towards: float, own: float, share: float, brake: float, k1: float, k2: float
+) -> float:
+    """Evaluate how fast two bodies at distance d that close at speed ``towards`` may close faster.
+
+        v̇ ≤ −s v v_adm'(d) + k₂ e (1 + (e/`EASE`)⁴),   e = s v_adm(d) − v_own
+
+    The power, where e is above zero, lets what is far and slow change as it likes. Of two that avoid
+    each other one has the share s and moves at v_own towards the other; alone s is 1, v_own is v.
+    """
+    allowed, slope = allowed_speed(d, brake, k1)
+    left = share * allowed - own
+    ease = max(left, 0.0) / EASE
+    return k2 * left * (1.0 + ease**4) - share * towards * slope
 
 
 def stopping_command(

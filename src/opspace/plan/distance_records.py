@@ -22,6 +22,7 @@ DISTANCES = RecordTable(
     _plan("set_place", ("sets", 2), "body and joint of each set, −1 for none", dtype=_INT),
     _refresh("set_local", ("sets", 12), "its rotation on the body by columns, its position", "m"),
     _plan("extent", ("sets", 7), "where it begins and ends, and by how much it is grown", "m"),
+    _plan("share", ("sets",), "of what closes, for the robot; 0 where the set just goes on"),
     _refresh("twist", ("sets", 6), "motion of an obstacle at its origin", "m/s, rad/s"),
     _plan("row", ("distances", 2), "a ball and a set each", dtype=_INT),
     Field("ball_motion", ("balls", 9), "where it is, its velocity and drift", "m, m/s, m/s²"),

@@ -47,6 +47,7 @@ class PackedDistances:
                 d.set_local[i, :9], d.set_local[i, 9:] = R.T.reshape(9), p
         d.extent[:, :3], d.extent[:, 3:6] = layout.lower, layout.upper
         d.extent[:, 6] = layout.set_radius
+        d.share[:] = layout.share
 
     @property
     def moving(self) -> bool:

@@ -38,7 +38,7 @@ def about_collisions(guard: CollisionAvoidance) -> dict[str, Any]:
 
     Returns:
         ``margin``, m; ``shapes`` and ``pairs`` of links; ``obstacles`` by name: where the set begins and
-        ends in its own axes, null where it does not, and by how much it is grown, m.
+        ends in its own axes, null where it does not, by how much it is grown, m, and its share.
     """
     return {
         "margin": guard.margin,
@@ -50,6 +50,7 @@ def about_collisions(guard: CollisionAvoidance) -> dict[str, Any]:
                 "lower": _finite(o.lower),
                 "upper": _finite(o.upper),
                 "radius": o.radius,
+                "share": o.share,
                 "ignore": list(o.ignore),
             }
             for o in guard.obstacles
@@ -73,9 +74,11 @@ def recorded_obstacle(name: str, about: Mapping[str, Any]) -> Obstacle:
     )
     lower, upper = ends
     here = np.zeros(3)
-    return Obstacle(
+    found = Obstacle(
         name, (lower, upper), about["radius"], here, np.eye(3), np.zeros(6), about["ignore"]
     )
+    found.share = float(about.get("share", 0.0))
+    return found
 
 
 def columns_of_collisions(guard: CollisionAvoidance) -> list[Column]:

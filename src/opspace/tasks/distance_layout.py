@@ -33,6 +33,7 @@ class DistanceLayout:
         lower: (sets, 3) where each set begins in its own axes, m.
         upper: (sets, 3) where it ends, m.
         set_radius: (sets,) by how much it is grown, m.
+        share: (sets,) see `Obstacle.share`; 0 for links.
         rows: (rows, 2) a ball and a set each.
         pairs: Names of the pairs of bodies, "body/body".
         pair: (rows,) the pair that each row belongs to.
@@ -48,6 +49,7 @@ class DistanceLayout:
     lower: np.ndarray
     upper: np.ndarray
     set_radius: np.ndarray
+    share: np.ndarray
     rows: np.ndarray
     pairs: tuple[str, ...]
     pair: np.ndarray
@@ -111,6 +113,7 @@ def lay_out(
         np.concatenate([-halves, np.array(lower).reshape(-1, 3)]),
         np.concatenate([halves, np.array(upper).reshape(-1, 3)]),
         np.array([*[s.radius for s in shapes], *[o.radius for o in obstacles]]),
+        np.array([*[0.0] * len(shapes), *[o.share for o in obstacles]]),
         rows[:, :2],
         names,
         rows[:, 2],

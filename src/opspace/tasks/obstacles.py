@@ -52,6 +52,8 @@ class Obstacle:
         lower: (3,) where the box begins in its own axes, m.
         upper: (3,) where it ends, m.
         radius: By how much it is grown, m.
+        share: Where it keeps away itself, the part of the speed at which the two may close that is left
+            to the robot, below 1; 0 where it goes on as it moves, whatever comes.
     """
 
     def __init__(
@@ -72,6 +74,7 @@ class Obstacle:
         self.ignore = tuple(ignore)
         self.lower, self.upper = np.array(extent[0], float), np.array(extent[1], float)
         self.radius = radius
+        self.share = 0.0
         # One record, assigned once: a tick in another thread sees the old place or the new one.
         self._state = self._told(position, rotation, velocity, _NONE)
 

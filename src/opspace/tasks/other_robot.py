@@ -15,15 +15,19 @@ from opspace.tasks.collision_avoidance import wanted_shapes
 from opspace.tasks.distance_layout import along
 from opspace.tasks.obstacles import Ball, Capsule, Obstacle
 from opspace.tasks.rotation import as_rotation
-from opspace.tasks.validation import finite_array
+from opspace.tasks.validation import finite, finite_array
 
 
 class OtherRobot:
     """The links of a robot as obstacles for another one, with their velocities.
 
     Hand `obstacles` to the other's `opspace.CollisionAvoidance`, and call `follow` with what this robot
-    does, from any thread. Each of two arms may avoid the other in this way, as the last line of
-    defence: each takes the other for something that goes on as it moves.
+    does, from any thread.
+
+    Two robots that keep away from each other share the speed at which they may close: each moves
+    towards the other at ``share`` of it at most, whatever the other does, and one that stands is never
+    made to give way. Each gets an `OtherRobot` of the other, with shares whose sum is 1, and guards with
+    the same margin and brake. Without a share this robot is something that goes on as it moves.
 
     Args:
         robot: The robot; it is not changed.
@@ -32,6 +36,8 @@ class OtherRobot:
         shapes: Its shapes, as for `opspace.CollisionAvoidance`.
         name: What the names of the obstacles begin with.
         ignore: Links of the robot that avoids it which may touch it.
+        share: The part, above 0 and below 1, of the speed at which the two may close that is for the
+            robot that avoids it, where this one avoids that one with the rest; None where it does not.
 
     Raises:
         InputError: Numbers that cannot be used.
@@ -47,7 +53,11 @@ class OtherRobot:
         shapes: str | Path | Sequence[LinkCapsule] = "model",
         name: str = "other",
         ignore: Iterable[str] = (),
+        share: float | None = None,
     ) -> None:
+        part = 0.0 if share is None else finite(share, f"the share of {name!r}")
+        if share is not None and not 0.0 < part < 1.0:
+            raise InputError(f"the share of {name!r} must be above 0 and below 1, not {share!r}")
         self._position = finite_array(position, (3,), f"the position of {name!r}")
         self._rotation = as_rotation(rotation, f"the rotation of {name!r}")
         given, _ = wanted_shapes(shapes)
@@ -64,6 +74,8 @@ class OtherRobot:
                 found, self._places, _words(name, found), strict=True
             )
         )
+        for obstacle in self.obstacles:
+            obstacle.share = part
         self.follow(robot.q_reference, np.zeros(robot.nv))
 
     def __repr__(self) -> str:
