@@ -1,6 +1,9 @@
 """Random programs of requests on a standing G1: forces and torques that exist, and nothing lost."""
 
+import threading
+import time
 from dataclasses import replace
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -197,6 +200,47 @@ def test_the_programs_do_overlap_and_reach_the_limits():
     play()
     assert max(show.overlap for show in shows) >= 5
     assert max(show.limited for show in shows) > 5
+
+
+def test_contacts_and_tasks_are_asked_for_from_any_thread():
+    """Each thread has one member of the stack, knows what is possible, and has it there in the end."""
+    show = Show([], 0.01)
+    stack, hand = show.controller.stack, show.program.tasks[2]
+    wrong = []
+
+    def ask(insert, remove):
+        try:
+            for _ in range(15):
+                remove()
+                time.sleep(1e-3)
+                insert()
+        except BaseException as error:
+            wrong.append(error)
+
+    for contact in show.contacts:
+        stack.insert(contact, 0.0)
+    stack.insert(hand, 0.5, 0.0)
+    members = [(one,) for one in show.contacts] + [(hand, 0.5)]
+    threads = [
+        threading.Thread(
+            target=ask,
+            args=(partial(stack.insert, *one, 0.03), partial(stack.remove, one[0], 0.03)),
+        )
+        for one in members
+    ]
+    for thread in threads:
+        thread.start()
+    for tick in range(1, 100000):
+        alive = any(thread.is_alive() for thread in threads)
+        show.command = show.controller.step(10.0 + tick * show.dt, show.q, show.v)
+        show._check()
+        if not alive and stack.settled:
+            break
+    assert not wrong
+    assert stack.settled
+    assert all(told.progress == 1.0 for told in show.command.contacts.values())
+    assert len(show.command.contacts) == len(show.contacts)
+    assert show.command.tasks["hand"].activation == 1.0
 
 
 @pytest.mark.slow
