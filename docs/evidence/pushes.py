@@ -26,9 +26,9 @@ CSV = EVIDENCE / "pushes.csv"
 DOCUMENT = DOCS / "safety.md"
 HALF, OFFSET = (0.085, 0.025), (0.035, 0.0, -0.035)
 """Half the sides of a sole, and its middle in the frame of the ankle, m."""
-TICK, AT, AFTER = 2e-3, 0.1, 2.5
+TICK, AT, AFTER = 2e-3, 0.02, 2.5
 """Time of a tick, of the push, and for how long a robot is watched after it, s."""
-STOOD, STILL = 2e-3, 0.02
+STOOD, STILL = 4e-3, 0.3
 """Error of the centre of mass and speed of every coordinate below which a push is over, m and 1/s."""
 LAWS = {
     "ours": osc.Controller,

@@ -244,14 +244,14 @@ def test_contacts_and_tasks_are_asked_for_from_any_thread():
 
 
 @pytest.mark.slow
-@settings(max_examples=60)
+@settings(max_examples=30)
 @given(steps=standing_programs)
 def test_at_a_kilohertz_forces_and_torques_exist_and_nothing_is_lost(steps):
     assert_nothing_is_lost(Show(steps, 0.001))
 
 
 @pytest.mark.slow
-@settings(max_examples=10)
+@settings(max_examples=6)
 @given(steps=standing_programs)
 def test_a_quarter_of_the_tick_makes_less_than_half_of_the_step(steps):
     """Nothing jumps: contacts, tasks and active limits come and go in as small steps as one likes."""

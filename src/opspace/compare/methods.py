@@ -15,6 +15,7 @@ from opspace.compare.projections import BarrierProgram
 from opspace.compare.tsid_controller import TsidController, tsid_installed
 from opspace.controller import Controller, ReferenceController
 from opspace.scenario import Scenario
+from opspace.scenario.build import build_robot
 
 
 @dataclass(frozen=True)
@@ -118,8 +119,9 @@ METHODS: Mapping[str, Method] = MappingProxyType(
 
 def usable_methods(scenario: Scenario) -> list[str]:
     """Name the methods that are installed and can drive the robot of a scenario."""
+    floats = bool(scenario.contacts) or build_robot(scenario).floating_base
     return [
         name
         for name, method in METHODS.items()
-        if method.installed() and (method.stands or not scenario.contacts)
+        if method.installed() and (method.stands or not floats)
     ]
