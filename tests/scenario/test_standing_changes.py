@@ -162,6 +162,28 @@ def test_a_push_is_taken_back_within_all_limits(robot, impulse, axis, most):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(
+    ("robot", "impulse", "axis"),
+    [
+        ("g1", 14.0, 0),
+        ("g1", 20.0, 1),
+        ("talos", 32.0, 0),
+        ("talos", -32.0, 0),
+        ("talos", 40.0, 1),
+    ],
+)
+def test_as_much_as_feet_can_take_is_taken(robot, impulse, axis):
+    """These are not balanced for much longer than a rule by the clock would let them be."""
+    seen = pushed(robot, impulse, axis)
+    unbalanced = sum(Status.NOT_BALANCED in status for status in seen.status)
+    print(robot, impulse, axis, seen.step(PUSHED + 0.102), max(seen.com), unbalanced)
+    assert seen.upright
+    assert unbalanced > 300
+    assert seen.com[-1] < 5e-3
+    assert seen.beyond_motors() <= 0.0
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("impulse", [40.0, -40.0])
 def test_who_cannot_be_saved_is_given_up_before_it_lies(impulse):
     seen = pushed("talos", impulse, 0)
