@@ -9,10 +9,11 @@ from tests.scenario.short import HOLD, short
 from opspace.cli import main
 from opspace.compare import METHODS, compare_scenario
 from opspace.compare.laws import continuous_inverse, damped_inverse, stack_of_tasks
+from opspace.compare.methods import usable_methods
 from opspace.compare.tsid_controller import tsid_installed
 from opspace.errors import InputError, UnknownNameError
 from opspace.law import TaskSet, task_torque
-from opspace.scenario import dump_scenario
+from opspace.scenario import dump_scenario, load_scenario
 from opspace.scenario.build import build
 
 TASKS = {
@@ -151,3 +152,19 @@ def test_tsid_asks_for_the_same_accelerations():
     scenario = short(robot="panda", tasks={"position": HOLD["tasks"]["position"]})
     found = torques(scenario, "tsid", 3)
     np.testing.assert_allclose(found[:, 1], found[:, 0], rtol=0, atol=0.5)
+
+
+def test_a_robot_that_stands_is_measured_with_the_forces_of_its_contacts():
+    scenario = load_scenario("humanoid-push", ["duration=0.01"])
+    found = compare_scenario(scenario, ["opspace", "soft-weights"])
+    ours, weighted = found.rows["opspace"], found.rows["soft-weights"]
+    assert ours.completed
+    assert weighted.completed
+    assert ours.leak < 1e-6
+    assert 1e-6 < weighted.leak < 1.0
+    assert ours.overshoot == 0.0
+    assert {"opspace", "soft-weights"} <= set(usable_methods(scenario))
+    assert not {"cbf-qp", "tsid"} & set(usable_methods(scenario))
+    assert "cbf-qp" in usable_methods(short())
+    with pytest.raises(InputError, match="knows no contacts"):
+        compare_scenario(scenario, ["cbf-qp"])

@@ -7,6 +7,7 @@ import pytest
 
 import opspace as osc
 from opspace.controller.falling import SLACKENING
+from opspace.controller.reference import ReferenceController
 from opspace.errors import InputError
 
 TICK = 0.005
@@ -62,6 +63,26 @@ def test_what_is_not_balanced_for_a_moment_stands():
     controller.step(3 * TICK, controller.robot.q_reference, still)
     found = [controller.step(k * TICK, controller.robot.q_reference, still) for k in range(4, 10)]
     assert all(osc.Status.FALLING not in command.status for command in found)
+
+
+@pytest.mark.parametrize("kind", [osc.Controller, ReferenceController])
+@pytest.mark.parametrize(
+    ("slows", "nears", "falls"), [(0.01, 0.0, False), (0.0, 0.04, False), (-0.01, -0.04, True)]
+)
+def test_whoever_slows_down_or_comes_back_is_not_given_up(kind, slows, nears, falls):
+    robot = osc.load_robot("g1")
+    com = osc.ComTask()
+    stack = osc.Stack([com, osc.PostureTask(kp=25.0)])
+    controller = kind(robot, stack, falling=osc.FallRule(after=0.02))
+    v, found = np.zeros(robot.nv), []
+    robot.update(robot.q_reference, v)
+    here = robot.com_position().copy()
+    for k in range(10):
+        v[0] = 0.5 - slows * k
+        com.target = here + (1.0 - nears * k, 0.0, 0.0)
+        found.append(controller.step(k * TICK, robot.q_reference, v).status)
+    assert all(osc.Status.NOT_BALANCED in one for one in found)
+    assert [osc.Status.FALLING in one for one in found] == [falls and k >= 4 for k in range(10)]
 
 
 def test_a_base_that_has_turned_is_falling_until_a_restart():

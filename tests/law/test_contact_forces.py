@@ -286,6 +286,54 @@ def test_a_contact_fades_through_the_projection_without_a_step():
         assert np.max(np.abs(taus[1] - taus[0])) < 1e-4
 
 
+class Loop(Standing):
+    """A body whose state, commands and contacts go once around a smooth loop, limits acting."""
+
+    def __init__(self, seed):
+        super().__init__(seed)
+        rng = self.rng
+        self.wanted_of_tasks, self.rest = super().tasks(), (self.M, self.bias, self.J)
+        self.heavier = np.diag(rng.uniform(0.0, 0.1, self.n))
+        self.pulls = rng.normal(0.0, 12.0, (2, self.n))
+        self.turns = rng.normal(0.0, 0.02, (2, 6, self.n))
+        self.limits = self.room()
+
+    def tasks(self):
+        return self.wanted_of_tasks
+
+    def taus(self, points):
+        """Torques at so many points of the loop, and how many of them had something to give up."""
+        M, bias, J = self.rest
+        found = []
+        for phase in 2.0 * np.pi * np.arange(points) / points:
+            way = np.array([np.cos(phase), np.sin(phase)])
+            self.M = M + (1.0 + way[0]) * self.heavier
+            self.L = np.linalg.cholesky(self.M)
+            self.bias = bias + way @ self.pulls
+            self.J = [one + np.tensordot(way, self.turns, 1) for one in J]
+            self.h = (1.0, 1.0, 0.5 - 0.5 * way[0])
+            found.append(realise(self.wish(), self.sets(self.h, 200.0), self.limits))
+        return np.array([one.tau for one in found]), sum(one.projected for one in found)
+
+
+def largest_step(taus):
+    return np.max(np.abs(np.diff(taus, axis=0, append=taus[:1])))
+
+
+@pytest.mark.parametrize(
+    ("seed", "points"),
+    [(0, 100), *(pytest.param(seed, 1500, marks=pytest.mark.slow) for seed in range(4))],
+)
+def test_four_times_as_many_points_of_a_loop_make_a_quarter_of_the_step(seed, points):
+    """It jumps nowhere: the third contact comes and goes on the way, and limits act throughout."""
+    loop = Loop(seed)
+    (coarse, limited), (fine, _) = loop.taus(points), loop.taus(4 * points)
+    ratio = largest_step(coarse) / largest_step(fine)
+    print(seed, points, limited, largest_step(coarse), ratio)
+    assert limited > 0.9 * points
+    assert 3.5 <= ratio <= 4.5
+
+
 def test_in_flight_the_base_falls_and_the_joints_do_what_they_can():
     body = Body(3)
     qdd, tasks = body.wanted(())

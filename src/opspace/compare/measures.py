@@ -29,7 +29,8 @@ class Measures:
         error_inside: RMS error of the most important level while tasks change, m and rad.
         error_outside: The same while none does, m and rad.
         leak: Largest ‖J q̈ + J̇ q̇ − f*‖ of the most important level where nothing is in its way:
-            no joint limit, no faded direction, no transition of its own; m/s² and rad/s².
+            no joint limit, no faded direction, nothing that contacts do not give, no transition of
+            its own; m/s² and rad/s².
         overshoot: Furthest that a joint got beyond a limit, rad.
         tick: Median time of a control tick, µs.
     """
@@ -97,7 +98,8 @@ class Watch:
         self.leak.append(self._leak(command, top))
         limits = self._controller.stack.limits
         for side in limits.sides if limits is not None else ():
-            beyond = side.sign * (q[side.index] - side.limit)
+            # A floating base turns by four numbers and has three turning speeds.
+            beyond = side.sign * (q[side.index + q.size - v.size] - side.limit)
             self.overshoot = max(self.overshoot, float(beyond))
 
     def _top(self, command: Command) -> list[str]:
@@ -112,10 +114,11 @@ class Watch:
         return list(there) if whole else []
 
     def _leak(self, command: Command, top: Sequence[str]) -> float:
-        if command.status & (Status.JOINT_LIMIT | Status.DIRECTION_OFF):
+        if command.status & (Status.JOINT_LIMIT | Status.DIRECTION_OFF | Status.GIVEN_UP):
             return np.nan
         robot = self._controller.robot
-        acceleration = np.linalg.solve(robot.M, command.tau - robot.bias)
+        pushed = self._carried(command)
+        acceleration = np.linalg.solve(robot.M, command.tau + pushed - robot.bias)
         known = {task.name: task for task in self._controller.stack}
         worst = np.nan
         for name in top:
@@ -123,6 +126,17 @@ class Watch:
             missed = terms.J @ acceleration + terms.drift - terms.acceleration
             worst = np.fmax(worst, float(np.linalg.norm(missed)))
         return float(worst)
+
+    def _carried(self, command: Command) -> np.ndarray:
+        """Σ Jᵀ λ of the contacts of a tick, (n,)."""
+        robot, contacts = self._controller.robot, self._controller.stack.contacts
+        pushed = np.zeros(robot.nv)
+        for name, told in command.contacts.items():
+            if name in contacts:
+                terms = contacts[name].evaluate(robot)
+                own = np.concatenate([terms.axes.T @ told.force, terms.axes.T @ told.moment])
+                pushed += terms.J.T @ own[: terms.J.shape[0]]
+        return pushed
 
 
 def measure(watch: Watch, timed: Timed, outcome: Outcome) -> Measures:

@@ -15,6 +15,7 @@ from opspace.compare.projections import BarrierProgram
 from opspace.compare.tsid_controller import TsidController, tsid_installed
 from opspace.controller import Controller, ReferenceController
 from opspace.scenario import Scenario
+from opspace.scenario.build import build_robot
 
 
 @dataclass(frozen=True)
@@ -28,6 +29,7 @@ class Method:
         changes: What it changes in a scenario.
         profile: Profile of every event; None leaves them as they are.
         installed: Whether the package that it needs is there.
+        stands: Whether it can drive a robot that stands on contacts.
     """
 
     title: str
@@ -36,6 +38,7 @@ class Method:
     changes: Mapping[str, Any] = field(default_factory=dict[str, Any])
     profile: str | None = None
     installed: Callable[[], bool] = lambda: True
+    stands: bool = True
 
     def scenario(self, scenario: Scenario) -> Scenario:
         """Write down what this method runs in place of a scenario."""
@@ -100,13 +103,25 @@ METHODS: Mapping[str, Method] = MappingProxyType(
             "the library's law, then a quadratic program with control barriers, α = 10/s",
             "joint ranges, speeds and distances are barriers",
             BarrierProgram,
+            stands=False,
         ),
         "tsid": Method(
             "TSID: one quadratic program, 100 to 1 from level to level, weights ramped",
             "no joint limits; no sigma buffer",
             TsidController,
             installed=tsid_installed,
+            stands=False,
         ),
     }
 )
 """Every method by name, the library's own first."""
+
+
+def usable_methods(scenario: Scenario) -> list[str]:
+    """Name the methods that are installed and can drive the robot of a scenario."""
+    floats = bool(scenario.contacts) or build_robot(scenario).floating_base
+    return [
+        name
+        for name, method in METHODS.items()
+        if method.installed() and (method.stands or not floats)
+    ]

@@ -91,6 +91,10 @@ class AnotherProjection(Controller):
         Raises:
             InputError: See there; or the robot or the stack has no compiled tick.
         """
+        if self.robot.floating_base:
+            raise InputError(
+                f"{type(self).__name__} knows no contacts and cannot drive a robot that floats"
+            )
         command = super().step(t, q, v, wrenches=wrenches)
         if self._plan is None:
             raise InputError(

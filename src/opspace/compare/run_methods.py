@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from opspace.compare.measures import Measures, Timed, Watch, measure
-from opspace.compare.methods import METHODS
+from opspace.compare.methods import METHODS, usable_methods
 from opspace.errors import unknown_name
 from opspace.loop import StopRule, simulate
 from opspace.plots import save
@@ -88,7 +88,8 @@ def compare_scenario(
 
     Args:
         scenario: The scenario.
-        methods: Names of methods; none stands for all that are installed.
+        methods: Names of methods; none stands for all that are installed and can
+            drive the robot.
         out: Directory for ``compare.json`` and ``compare.png``; None writes nothing.
         progress: Bar that gets a line for each run.
 
@@ -102,7 +103,7 @@ def compare_scenario(
     for name in methods:
         if name not in METHODS:
             raise unknown_name("method", name, METHODS)
-    wanted = methods or [name for name, method in METHODS.items() if method.installed()]
+    wanted = methods or usable_methods(scenario)
     rows = {name: _run(scenario, name, progress) for name in wanted}
     comparison = Comparison(scenario, rows)
     if out is not None:

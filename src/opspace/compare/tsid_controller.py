@@ -51,6 +51,8 @@ class TsidController(ReferenceController):
         robot = self.robot
         robot.update(q, v)
         if self._program is None:
+            if robot.floating_base:
+                raise InputError("this form of TSID knows no contacts: its robots are bolted down")
             if self.collisions is not None:
                 raise InputError("this form of TSID keeps nothing apart: run it without collisions")
             self._program = Program(self)

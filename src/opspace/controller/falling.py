@@ -15,19 +15,26 @@ from opspace.tasks.rotation import matrix_from_quaternion
 
 SLACKENING = 0.05
 """Time in which the torque of the last tick that stood goes away, s."""
+SLOWER = 0.02
+"""By how much its centre of mass has to slow down for a robot to be on its way back, m/s."""
+LESS = 0.05
+"""Or by how much less it has to give up, in weights."""
 
 
 @dataclass(frozen=True)
 class FallRule:
     """When a robot on contacts counts as falling.
 
-    It falls when ``Status.NOT_BALANCED`` has held without a break for ``after``, or when the base
-    has turned away from upright, which is how it stands in the robot's reference posture, by more than
-    ``tilt``. From then on no task is followed: the joints are damped until `opspace.Controller.restart`.
+    It falls when ``Status.NOT_BALANCED`` has held for ``after`` and nothing has got better: the
+    centre of mass has not become slower, nor what is given up less. A robot that takes back a push is
+    not balanced for much longer than the push, but first it slows down, then it comes back, and what its
+    tasks want comes into reach. It falls as well when the base has turned away from upright, which is
+    how it stands in the robot's reference posture, by more than ``tilt``. From then on no task is
+    followed: the joints are damped until `opspace.Controller.restart`.
 
     Attributes:
-        after: How long the robot may be not balanced, s. A push is over sooner; a flight that is
-            wanted is not.
+        after: How long the robot may be not balanced without getting better, s. A push is over
+            sooner; a flight that is wanted is not.
         tilt: How far the vertical may be from where it is in the base when it stands, rad.
 
     Raises:
@@ -68,28 +75,50 @@ class FallWatch:
 
     def forget(self) -> None:
         """Let the robot stand again."""
-        self._unbalanced: float | None = None
+        self._hopeless: float | None = None
+        self._fastest = self._most = 0.0
         self._fell: float | None = None
         self._last = np.zeros(self._robot.nv)
 
-    def after(self, command: Command) -> Command:
-        """Look at a tick, and answer in its place once the robot falls."""
+    def after(self, command: Command, given_up: float) -> Command:
+        """Look at a tick, and answer in its place once the robot falls.
+
+        Args:
+            command: The tick.
+            given_up: What it gave up, in weights.
+        """
         if self._fell is None:
-            if not self._falls(command):
+            if not self._falls(command, given_up):
                 self._last = command.tau
                 return command
             self._fell = command.t
         tau = self._damped(command.t - self._fell)
         return command._replace(tau=tau, status=command.status | Status.FALLING)
 
-    def _falls(self, command: Command) -> bool:
+    def _falls(self, command: Command, given_up: float) -> bool:
         if Status.NOT_BALANCED not in command.status:
-            self._unbalanced = None
-        elif self._unbalanced is None:
-            self._unbalanced = command.t
-        lost = self._unbalanced is not None and command.t - self._unbalanced >= self._rule.after
+            self._hopeless = None
+        elif self._hopeless is None:
+            self._hopeless = command.t
+            self._fastest, self._most = self._speed(), given_up
+        elif self._gets_better(given_up):
+            self._hopeless = command.t
+        lost = self._hopeless is not None and command.t - self._hopeless >= self._rule.after
         turned = float(_vertical(self._robot.q) @ self._upright)
         return lost or turned < math.cos(min(self._rule.tilt, math.pi))
+
+    def _gets_better(self, given_up: float) -> bool:
+        """Compare with the worst since it last got better; noise moves neither by that much."""
+        speed = self._speed()
+        slower, less = speed < self._fastest - SLOWER, given_up < self._most - LESS
+        self._fastest = speed if slower else max(self._fastest, speed)
+        self._most = given_up if less else max(self._most, given_up)
+        return slower or less
+
+    def _speed(self) -> float:
+        """Speed of the centre of mass, m/s: the momentum over the mass, the base's rows of M v."""
+        M = self._robot.M
+        return float(np.linalg.norm(M[:3] @ self._robot.v) / M[0, 0])
 
     def _damped(self, since: float) -> np.ndarray:
         robot = self._robot

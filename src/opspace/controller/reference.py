@@ -23,6 +23,7 @@ from opspace.controller.watchdog import Watchdog
 from opspace.controller.wrenches import Wrenches, WrenchInput
 from opspace.errors import InputError, unknown_name
 from opspace.law import Profile
+from opspace.law.scalars import MAY_GIVE_UP
 from opspace.plan.scales import DEFAULT_SINGULARITY, Scales, Singularity
 from opspace.robots.adapter import AdapterBase
 from opspace.robots.motor_range import motor_range
@@ -330,7 +331,7 @@ class ReferenceController:
         if self._handover is None and self._integral is not None:
             self._integral.after(command, members)
         if self._fall is not None:
-            command = self._fall.after(command)
+            command = self._fall.after(command, self.stack.hindrance * MAY_GIVE_UP)
             self._last_torque = command.tau
         added, handover = self._added_by_robot(), self._handover
         if handover is None:

@@ -157,7 +157,7 @@ class FallingEntry(Entry):
     """When a robot on contacts is given up: from then on its joints are only damped."""
 
     after: Annotated[float, Number("s", above=0.0)] = Field(
-        default=0.2, description="how long it may be not balanced [s]"
+        default=0.2, description="how long it may be not balanced without getting better [s]"
     )
     tilt: Annotated[float, Number("rad", above=0.0)] = Field(
         default=0.8, description="how far its base may turn from where it was upright [rad]"

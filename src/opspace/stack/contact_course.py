@@ -199,6 +199,11 @@ class ContactCourse:
         """Tell what was given up in a tick, as a multiple of what may be."""
         self._hindrance = hindrance
 
+    @property
+    def hindrance(self) -> float:
+        """What was told last."""
+        return self._hindrance
+
     def begin_tick(self, t: float) -> tuple[ContactMember, ...]:
         """Start what is due at time ``t`` [s], move on what is on its way, drop what has left."""
         dt = 0.0 if self._now is None else max(0.0, t - self._now)

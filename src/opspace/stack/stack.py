@@ -404,6 +404,11 @@ class Stack:
         """Tell the contacts that are to go what the last tick gave up, see `ContactMember.advance`."""
         self._contacts.hinder(hindrance)
 
+    @property
+    def hindrance(self) -> float:
+        """What the contacts were told last, see `hinder`."""
+        return self._contacts.hindrance
+
     def begin_tick(self, t: float) -> tuple[Member, ...]:
         """Start what is due at time ``t`` [s], drop what has left, and return the tasks there are.
 

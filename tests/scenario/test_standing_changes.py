@@ -1,0 +1,191 @@
+"""Robots that stand, while much changes at once, changes its mind half-way, or pushes them."""
+
+import numpy as np
+import pytest
+
+from opspace.command import Status
+from opspace.scenario import load_scenario, scenario_from
+from tests.scenario.standing_runs import Seen
+
+ONE_SIDE = {
+    "g1": {"half": [0.085, 0.025], "offset": [0.035, 0.0, -0.035]},
+    "talos": {"half": [0.1, 0.06]},
+}
+FRAMES = {
+    "g1": ("{}_ankle_roll_link", "torso_link", "pelvis"),
+    "talos": ("{}_sole_link", "torso_2_link", "base_link"),
+}
+MIDDLE = {"g1": 0.0, "talos": -0.017}
+"""How far the centre of mass moves before the push, to be over the middle of the soles, m."""
+PUSHED = 1.0
+
+
+@pytest.mark.slow
+def test_four_changes_at_once_move_the_torque_no_more_than_one():
+    ours, hard = (
+        Seen(load_scenario("humanoid-four-at-once", [f"method={method}"]))
+        for method in ("transition", "switch")
+    )
+    print("four at once", ours.step(), hard.step(), max(ours.com))
+    assert ours.outcome.completed
+    assert ours.upright
+    assert list(ours.controller.stack.contacts) == ["left", "right"]
+    assert ours.controller.stack.settled
+    assert ours.step() <= 0.5
+    assert hard.step() >= 20.0 * ours.step()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize(
+    ("name", "overrides"),
+    [("humanoid", ["duration=6.9"]), ("humanoid-four-at-once", [])],
+)
+def test_masses_that_are_ten_per_cent_wrong(name, overrides, seed):
+    seen = Seen(load_scenario(name, [*overrides, "plant.mass_error=0.1", f"seed={seed}"]))
+    print(name, seed, seen.step(), max(seen.com))
+    assert seen.upright
+    assert "right" in seen.controller.stack.contacts
+    assert seen.step() <= 0.5
+    assert max(seen.com) <= 4e-3
+
+
+def turned(events):
+    """Turn every change of a list around half-way, and begin it again."""
+    back = {"insert": "remove", "remove": "insert", "swap": "swap"}
+    found = []
+    for event in events:
+        found.append(event)
+        (kind,) = set(event) & set(back)
+        if "when" in event or event["duration"] == 0.0:
+            continue
+        half, name = 0.5 * event["duration"], event[kind]
+        returns = {"at": event["at"] + half, back[kind]: name, "duration": event["duration"]}
+        found += [returns, {**event, "at": event["at"] + 1.5 * half}]
+    return found
+
+
+class Lands:
+    """Turns the landing around: once half of the force is there it goes again, and comes back."""
+
+    def __init__(self):
+        self.turn = None
+
+    def __call__(self, controller, command):
+        stack, right = controller.stack, command.contacts.get("right")
+        if command.t < 4.5 or right is None:
+            return
+        if self.turn is None and right.progress > 0.6:
+            self.turn = command.t
+            stack.remove("right", 0.3)
+            stack.insert(next(task for task in stack if task.name == "foot"), 0.5, 0.3)
+        elif self.turn is not None and command.t > self.turn + 0.1:
+            self.turn = np.inf
+            stack.insert(stack.contacts["right"], 0.3)
+            stack.remove("foot", 0.3)
+
+
+@pytest.mark.slow
+def test_a_humanoid_that_turns_every_change_around_half_way():
+    data = load_scenario("humanoid").model_dump(mode="json", exclude_none=True)
+    data["events"] = turned(data["events"])
+    seen = Seen(scenario_from(data), Lands())
+    print("turned", seen.step(0.0, 4.5), seen.step(), max(seen.com), seen.controller.stack)
+    assert seen.upright
+    assert seen.asks.turn == np.inf
+    assert "palm" not in seen.controller.stack.contacts
+    assert seen.step(0.01, 4.5) <= 0.15
+    assert seen.step() <= 0.5
+    assert max(seen.com) <= 2e-3
+
+
+def pushed(robot, impulse, axis, **options):
+    """A standing robot that gets an impulse [N·s] at the pelvis within a tenth of a second."""
+    foot, torso, pelvis = FRAMES[robot]
+    soles = {
+        side: {"type": "sole", "frame": foot.format(side), **ONE_SIDE[robot]}
+        for side in ("left", "right")
+    }
+    middle = {"type": "minimum_jerk", "offset": [MIDDLE[robot], 0.0, 0.0], "duration": 0.9}
+    force = (10.0 * impulse * np.eye(3)[axis]).tolist()
+    return Seen(
+        scenario_from(
+            {
+                "robot": robot,
+                "duration": PUSHED + 2.5,
+                "torque_limits": "priority",
+                "contacts": soles,
+                "tasks": {
+                    "com": {"type": "com", "level": 0, "target": middle},
+                    "torso": {"type": "orientation", "level": 1, "frame": torso},
+                    "posture": {"type": "posture", "level": 2, "kp": 25.0},
+                },
+                "plant": {
+                    "pushes": [{"at": PUSHED, "duration": 0.1, "force": force, "frame": pelvis}]
+                },
+                **options,
+            }
+        )
+    )
+
+
+def assert_it_stands_within_all_limits(seen, most):
+    assert seen.upright
+    assert seen.com[-1] < 1e-3
+    assert seen.step(PUSHED + 0.102) <= most
+    assert seen.beyond_joints() <= 0.05
+    assert seen.beyond_motors() <= 0.0
+    assert seen.cone_use <= 1.0 + 1e-6
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("robot", "impulse", "axis", "most"),
+    [
+        ("g1", 8.0, 0, 1.0),
+        ("g1", 8.0, 1, 1.0),
+        ("g1", -8.0, 1, 1.0),
+        ("talos", 25.0, 0, 4.0),
+        ("talos", -25.0, 0, 4.0),
+        ("talos", 25.0, 1, 4.0),
+        ("talos", 30.0, 0, 30.0),
+        ("talos", -30.0, 0, 30.0),
+        ("talos", 30.0, 1, 4.0),
+    ],
+)
+def test_a_push_is_taken_back_within_all_limits(robot, impulse, axis, most):
+    seen = pushed(robot, impulse, axis)
+    after = seen.step(PUSHED + 0.102)
+    print(robot, impulse, axis, after, max(seen.com), seen.beyond_joints(), seen.beyond_motors())
+    assert_it_stands_within_all_limits(seen, most)
+    assert max(seen.com) <= (0.015 if robot == "g1" else 0.06)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("robot", "impulse", "axis"),
+    [
+        ("g1", 14.0, 0),
+        ("g1", 20.0, 1),
+        ("talos", 32.0, 0),
+        ("talos", -32.0, 0),
+        ("talos", 40.0, 1),
+    ],
+)
+def test_as_much_as_feet_can_take_is_taken(robot, impulse, axis):
+    """These are not balanced for much longer than a rule by the clock would let them be."""
+    seen = pushed(robot, impulse, axis)
+    unbalanced = sum(Status.NOT_BALANCED in status for status in seen.status)
+    print(robot, impulse, axis, seen.step(PUSHED + 0.102), max(seen.com), unbalanced)
+    assert seen.upright
+    assert unbalanced > 300
+    assert seen.com[-1] < 5e-3
+    assert seen.beyond_motors() <= 0.0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("impulse", [40.0, -40.0])
+def test_who_cannot_be_saved_is_given_up_before_it_lies(impulse):
+    seen = pushed("talos", impulse, 0)
+    fell = next(i for i, status in enumerate(seen.status) if Status.FALLING in status)
+    assert seen.q[fell][2] > 0.9 * seen.q[0][2]
