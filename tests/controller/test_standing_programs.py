@@ -8,7 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 import opspace as osc
@@ -22,8 +22,8 @@ GRID = 0.01
 SHORTEST, LONGEST = 0.1, 0.3
 CLOSE = 1e-6 * 33.34114202 * 9.81
 """Planned and felt forces of a rigid robot differ by less, N."""
-LOST_USE = 0.05
-"""Where a falling robot's limits contradict each other, cones are a little soft as well."""
+SOFT = 0.05 * 33.34114202 * 9.81
+"""Where a falling robot's limits contradict each other, a force leaves its cone by less, N."""
 CONTACT_KINDS = ("touch", "leave", "leave anyway")
 
 
@@ -97,7 +97,11 @@ class Show:
         stay = [tasks[0], tasks[1], tasks[6]]
         stack = osc.Stack([osc.JointLimits(), *stay], contacts=feet)
         self.controller = kind(
-            self.robot, stack, torque_limits="priority", singularity=osc.Singularity()
+            self.robot,
+            stack,
+            torque_limits="priority",
+            singularity=osc.Singularity(),
+            falling=osc.FallRule(),
         )
         initial = {t.name: n for n, level in stack.levels_by_number.items() for t in level}
         self.program = StandingProgram(stack, tasks, self.contacts, steps, initial)
@@ -112,7 +116,7 @@ class Show:
         per, tick = round(GRID / self.dt), 0
         self.command = self.controller.step(0.0, self.q, self.v)
         quiet = 0
-        while quiet < 2.5 * LONGEST / self.dt:
+        while quiet < 2.5 * LONGEST / self.dt and not self.fell:
             self._advance()
             tick += 1
             if tick % per == 0:
@@ -133,12 +137,15 @@ class Show:
 
     def _check(self):
         command = self.command
+        if self.fell:  # what is told of contacts is what was planned, and is not done
+            return
         self.taus.append(command.tau)
         assert np.all(np.abs(command.tau) <= self.robot.torque_limit)
         assert np.all(command.tau[:6] == 0.0)
-        most = LOST_USE if osc.Status.LIMIT_LOST in command.status else 1e-6
+        lost = osc.Status.LIMIT_LOST in command.status
         for told in command.contacts.values():
-            assert told.cone_use <= 1.0 + most
+            outside = told.cone_use - 1.0
+            assert outside <= 1e-6 or (lost and outside * np.linalg.norm(told.force) <= SOFT)
             assert told.activation > 0.0 or not np.any(told.force)
         self.limited += osc.Status.FILTERED in command.status
 
@@ -160,6 +167,11 @@ class Show:
         self.v = self.v + self.dt * x[: plant.nv]
         self.q = plant.integrate(self.q, self.v, self.dt)
 
+    @property
+    def fell(self):
+        """Whether the robot was given up: what it is asked for from then on is not done."""
+        return osc.Status.FALLING in self.command.status
+
     def _holds(self, name):
         told = self.command.contacts.get(name)
         return told is not None and told.motion == 1.0
@@ -169,6 +181,8 @@ class Show:
 
 
 def assert_nothing_is_lost(show):
+    if show.fell:
+        return
     stack, command = show.controller.stack, show.command
     found = {t.name: n for n, level in stack.levels_by_number.items() for t in level}
     assert found == show.program.levels
@@ -240,7 +254,7 @@ def test_contacts_and_tasks_are_asked_for_from_any_thread():
     assert stack.settled
     assert all(told.progress == 1.0 for told in show.command.contacts.values())
     assert len(show.command.contacts) == len(show.contacts)
-    assert show.command.tasks["hand"].activation == 1.0
+    assert abs(show.command.tasks["hand"].activation - 1.0) < 1e-9
 
 
 @pytest.mark.slow
@@ -255,6 +269,8 @@ def test_at_a_kilohertz_forces_and_torques_exist_and_nothing_is_lost(steps):
 @given(steps=standing_programs)
 def test_a_quarter_of_the_tick_makes_less_than_half_of_the_step(steps):
     """Nothing jumps: contacts, tasks and active limits come and go in as small steps as one likes."""
-    coarse, fine = (Show(without_force(steps), dt).largest_step() for dt in (0.001, 0.00025))
+    shows = [Show(without_force(steps), dt) for dt in (0.001, 0.00025)]
+    assume(not any(show.fell for show in shows))
+    coarse, fine = (show.largest_step() for show in shows)
     print(coarse, fine)
     assert fine <= 0.5 * coarse + 1e-9

@@ -166,7 +166,8 @@ def test_a_lost_foot_is_noticed_and_let_go(unnoticed):
 
     class Watch:
         def observe(self, q, v, command):
-            seen.append((command.t, command.tau, set(command.contacts), command.status, q[2]))
+            off = command.tasks["com"].error_norm
+            seen.append((command.tau, set(command.contacts), command.status, q[2], off))
 
     outcome = simulate(built.plant, built.controller, 3.0, [built.triggers, Watch()], built.stop)
     assert outcome.completed

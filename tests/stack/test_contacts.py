@@ -93,6 +93,34 @@ def test_a_contact_that_waits_stays_and_comes_back_no_further_than_it_was():
     assert before < 1.0
 
 
+@given(
+    st.sampled_from([0.001, 0.005, 0.01]),
+    st.sampled_from([0.05, 0.2, 1.0]),
+    st.floats(5.0, 500.0),
+    st.floats(0.2, 0.9),
+)
+@settings(max_examples=60, deadline=None)
+def test_one_that_waits_comes_to_rest_whatever_the_tick(dt, duration, steepness, place):
+    """What it gives up grows as it goes; the tick after tells how much that was."""
+    foot = sole()
+    stack = stack_of(foot)
+    stack.begin_contacts(0.0)
+    stack.remove(foot, duration)
+    found = []
+    for i in range(1, round(3.0 * duration / dt) + 600):
+        (member,) = stack.begin_contacts(i * dt)
+        found.append(member.progress)
+        stack.hinder(max(0.0, 1.0 + steepness * (place - member.progress)))
+    assert np.max(np.abs(np.diff(found[-50:]))) <= 1e-4
+    assert abs(found[-1] - place) <= 0.01
+    assert member.waiting
+    stack.hinder(0.0)
+    for i in range(round(3.0 * duration / dt) + 600, round(6.0 * duration / dt) + 1200):
+        stack.begin_contacts(i * dt)
+        stack.hinder(0.0)
+    assert not stack.contacts
+
+
 def test_forced_or_coming_in_it_waits_for_nobody():
     foot = sole()
     stack = stack_of(foot)

@@ -19,6 +19,12 @@ MOTION_PART = 0.3
 """Part of the progress in which the motion comes; the force has the rest."""
 STOP = 2.0
 """A removal that gives up this many times what it may is taken back as fast as it went."""
+CALMER = 0.5
+"""How much slower a removal becomes when it turns from going on to going back, or the other way."""
+CALMEST = 0.02
+"""It becomes no slower than this part of its pace."""
+RECOVERY = 0.1
+"""Time in which one that does not turn becomes e times as fast again, s."""
 
 
 @dataclass(eq=False)
@@ -29,6 +35,10 @@ class ContactMember:
 
         h_m = p(s/0.3),   h_f = p((s − 0.3)/0.7)
 
+    A removal waits where what it gives up is what it may. The tick after tells how much that is, so in
+    ticks that are long beside the duration it would jump back and forth about that place; every turn
+    halves its pace until it rests there.
+
     Attributes:
         contact: The contact.
         progress: s, 0 out to 1 in.
@@ -38,6 +48,8 @@ class ContactMember:
         waits: Whether it stays in while the others cannot carry.
         highest: Where a removal began; waiting takes it back no further.
         waiting: Whether it waits now.
+        pace: Of the last tick, 1 where nothing hinders it, below 0 on its way back.
+        calm: Part of its pace at which it goes.
     """
 
     contact: GroundContact
@@ -48,6 +60,8 @@ class ContactMember:
     waits: bool = True
     highest: float = field(default=1.0, repr=False)
     waiting: bool = False
+    pace: float = field(default=1.0, repr=False)
+    calm: float = field(default=1.0, repr=False)
 
     def advance(self, dt: float, hindrance: float) -> None:
         """Move on by a tick.
@@ -64,7 +78,11 @@ class ContactMember:
             waits = self.waits and self.duration > 0.0
             pace = 1.0 - min(STOP, hindrance) if waits else 1.0
             self.waiting = pace < 0.5
-            self.progress = min(self.highest, max(self.target, self.progress - pace * step))
+            turned = pace * self.pace < 0.0
+            calm = self.calm * (CALMER if turned else 1.0 + dt / RECOVERY)
+            self.calm, self.pace = min(1.0, max(CALMEST, calm)), pace
+            moved = self.progress - self.calm * pace * step
+            self.progress = min(self.highest, max(self.target, moved))
 
     def send(self, target: float, timing: Timing, *, waits: bool = True) -> None:
         """Turn it towards 0 or 1."""
@@ -72,6 +90,7 @@ class ContactMember:
             self.profile = timing.profile
         self.target, self.duration, self.waits = target, timing.duration, waits
         self.highest = self.progress
+        self.pace = self.calm = 1.0
 
     def activations(self, own: float) -> tuple[float, float]:
         """Evaluate h_m and h_f.
