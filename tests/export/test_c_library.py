@@ -260,6 +260,129 @@ def test_what_cannot_be_used_is_refused_and_changes_nothing(tmp_path):
     assert other.step(t, q, v)[0] == first.status
 
 
+ASKERS = """
+#include <pthread.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include "controller.h"
+
+enum { WISHES = 2000 };
+static const int tasks[] = {CONTROLLER_TASK_position, CONTROLLER_TASK_joint1};
+static opspace *c;
+static int going = 2, strange;
+
+/* Moves a target again and again, ever further; whoever finds no room tries again. */
+static void *ask(void *which)
+{
+    for (int k = 1; k <= WISHES; k++) {
+        double x[3] = {1e-5 * k, 1e-5 * k, 1e-5 * k};
+        int answer;
+        do
+            answer = opspace_set_target(c, *(const int *)which, x, NULL, NULL);
+        while (answer == OPSPACE_BUSY);
+        if (answer)
+            __atomic_fetch_add(&strange, 1, __ATOMIC_RELAXED);
+    }
+    __atomic_fetch_sub(&going, 1, __ATOMIC_RELEASE);
+    return NULL;
+}
+
+int main(void)
+{
+    double q[CONTROLLER_NQ] = {0.0, 1.0, -2.9, 0.0, -1.2, 0.0}, v[CONTROLLER_N] = {0.0};
+    double tau[CONTROLLER_N];
+    pthread_t askers[2];
+    int steps = 0, there = 1;
+    c = opspace_open(&controller);
+    if (!c)
+        return EXIT_FAILURE;
+    for (int i = 0; i < 2; i++)
+        pthread_create(&askers[i], NULL, ask, (void *)&tasks[i]);
+    while (there) {
+        there = __atomic_load_n(&going, __ATOMIC_ACQUIRE);
+        if (opspace_step(c, 1e-3 * steps++, q, v, tau) < 0)
+            strange++;
+    }
+    for (int i = 0; i < 2; i++)
+        pthread_join(askers[i], NULL);
+    for (int i = 0; i < 2; i++) /* what was still on its way; a step reads every letter there is */
+        opspace_step(c, 1e-3 * steps++, q, v, tau);
+    const double *error = opspace_read(c, "error", NULL);
+    printf("%d %.17g %.17g\\n", strange, error[controller.task[tasks[0]].first_row],
+        error[controller.task[tasks[1]].first_row]);
+    opspace_close(c);
+    return EXIT_SUCCESS;
+}
+"""
+
+
+CMAKE = """
+cmake_minimum_required(VERSION 3.13)
+project(robot LANGUAGES C)
+add_subdirectory(arm)
+add_executable(program main.c)
+target_link_libraries(program opspace::controller)
+"""
+
+
+@with_cc
+@pytest.mark.skipif(shutil.which("cmake") is None, reason="cmake is not installed")
+def test_a_project_of_cmake_takes_it_in_as_a_folder(tmp_path):
+    controller, _ = start()
+    export_c(controller, tmp_path / "arm")
+    (tmp_path / "main.c").write_text(PROGRAM)
+    (tmp_path / "CMakeLists.txt").write_text(CMAKE)
+    build = tmp_path / "build"
+    for words in (["-S", tmp_path, "-B", build], ["--build", build]):
+        subprocess.run(["cmake", *words], check=True, capture_output=True)
+    T, Q, V = states(controller.robot, 5, 0.1)
+    given = np.column_stack([T, Q, V])
+    done = subprocess.run(
+        [build / "program"], input=given.tobytes(), capture_output=True, check=True
+    )
+    found = np.frombuffer(done.stdout).reshape(len(T), -1)
+    commands = [controller.step(*state) for state in zip(T.tolist(), Q, V, strict=True)]
+    np.testing.assert_array_equal(found[:, 1:], [command.tau for command in commands])
+
+
+@with_cc
+def test_threads_ask_while_another_steps_and_nothing_is_lost_or_waited_for(tmp_path):
+    robot = osc.load_robot("puma560")
+    hand = osc.PositionTask(target=[0.3, 0.1, 0.9])
+    stack = osc.Stack(
+        [hand, osc.JointTask("joint1", target=0.0), osc.PostureTask(0.0 * robot.q_reference)]
+    )
+    controller = osc.Controller(robot, stack, period=1e-3)
+    export_c(controller, tmp_path)
+    (tmp_path / "main.c").write_text(ASKERS)
+    program = compiled(tmp_path, "main.c", "controller.c", out="program", options=("-pthread",))
+    told = subprocess.run([program], capture_output=True, check=True, text=True).stdout.split()
+    assert told[0] == "0"
+    hand.target = np.full(3, 2000 * 1e-5)
+    stack["joint1"].target = 2000 * 1e-5
+    q = np.array([0.0, 1.0, -2.9, 0.0, -1.2, 0.0])
+    command = controller.step(0.0, q, np.zeros(6))
+    assert float(told[1]) == command.tasks["position"].error[0]
+    assert float(told[2]) == command.tasks["joint1"].error[0]
+
+
+@with_cc
+def test_more_wishes_than_there_is_room_for_are_refused_and_none_is_lost(tmp_path):
+    controller, (hand, _, _) = start()
+    c = InC(tmp_path, controller)
+    q, v = controller.robot.q_reference, np.zeros(6)
+    goals = [hand.target + 1e-3 * k for k in range(70)]
+    answers = [c.set("target", hand, goal, None, None) for goal in goals]
+    assert answers == [0] * 64 + [-5] * 6
+    c.step(0.0, q, v)
+    controller.robot.update(q, v)
+    at = controller.robot.position(controller.robot.tool)
+    np.testing.assert_allclose(c.read("error")[:3], goals[63] - at, atol=1e-12)
+    assert c.set("target", hand, goals[69], None, None) == 0
+    c.step(1e-3, q, v)
+    np.testing.assert_allclose(c.read("error")[:3], goals[69] - at, atol=1e-12)
+
+
 @with_cc
 def test_the_page_of_the_library_is_right(tmp_path):
     page = DOCS / "how-to" / "c-library.md"

@@ -14,6 +14,7 @@ import numpy as np
 
 from opspace.drivers.shared_memory import SharedRobotSide
 from opspace.drivers.udp import UdpRobotSide
+from opspace.drivers.unitree import UnitreeRobotSide
 from opspace.errors import InputError, OpspaceError
 from opspace.loop.any_plant import AnyPlant
 from opspace.loop.driver import WHO, RobotState
@@ -246,12 +247,14 @@ def parser() -> argparse.ArgumentParser:
     """What the command line may say."""
     parser = argparse.ArgumentParser(
         prog="python -m opspace.drivers.simulated_robot",
-        description="A simulated robot behind UDP or shared memory.",
+        description="A simulated robot behind UDP, shared memory or DDS.",
     )
     parser.add_argument("robot", help="name or file of a robot")
     how = parser.add_mutually_exclusive_group(required=True)
     how.add_argument("--udp", type=int, metavar="PORT", help="be driven over UDP; 0 is any port")
     how.add_argument("--memory", metavar="FILE", help="be driven through shared memory")
+    how.add_argument("--unitree", type=int, metavar="DOMAIN", help="be driven as one of Unitree's")
+    parser.add_argument("--interface", help="network interface for DDS")
     parser.add_argument("--period", type=float, default=1e-3, help="between two states, s")
     parser.add_argument("--gravity", choices=WHO, default="controller", help="who adds its torque")
     parser.add_argument("--torque-rate", type=float, help="the most that it takes, N·m/s")
@@ -277,12 +280,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         adds = given.gravity == "robot"
         plant = Plant(robot, robot.q_reference, dt=given.period, adds_gravity=adds)
         trouble = Trouble(given.loss, given.delay, given.reorder, given.seed)
-        if given.memory is None:
-            side = UdpRobotSide(given.udp, robot.nv)
-            print(f"listening at port {side.port}", flush=True)
-        else:
-            side = SharedRobotSide(given.memory, robot.nq, robot.nv)
-            print(f"sharing {given.memory}", flush=True)
+        side = _side_of(given, robot)
     except (OpspaceError, OSError) as error:
         words.error(str(error))
     one = SimulatedRobot(
@@ -303,6 +301,21 @@ def main(arguments: Sequence[str] | None = None) -> None:
     finally:
         side.close()
     print(json.dumps(asdict(one.account)), flush=True)
+
+
+def _side_of(given: argparse.Namespace, robot: Robot) -> RobotSide:
+    """Make what it is driven by, and say where."""
+    if given.unitree is not None:
+        side = UnitreeRobotSide(robot.nv, given.interface, given.unitree)
+        print(f"in domain {given.unitree}", flush=True)
+        return side
+    if given.memory is not None:
+        side = SharedRobotSide(given.memory, robot.nq, robot.nv)
+        print(f"sharing {given.memory}", flush=True)
+        return side
+    side = UdpRobotSide(given.udp, robot.nv)
+    print(f"listening at port {side.port}", flush=True)
+    return side
 
 
 if __name__ == "__main__":

@@ -38,6 +38,17 @@ COLUMNS = {
 """What the C source must know of `opspace.kernels.columns`, by the array that has it."""
 PRESS = ("GIVEN", "GIVEN_AT", "WANTED", "FORCES", "ON", "KI", "KP", "PRESS_SIZE")
 """What it must know of `opspace.law.press_columns`."""
+CMAKE = """\
+cmake_minimum_required(VERSION 3.13)
+project(opspace_{name} LANGUAGES C)
+
+add_library(opspace_{name} STATIC {name}.c opspace.c opspace_kernels.o)
+add_library(opspace::{name} ALIAS opspace_{name})
+set_source_files_properties(opspace_kernels.o PROPERTIES EXTERNAL_OBJECT TRUE)
+set_target_properties(opspace_{name} PROPERTIES C_STANDARD 99 POSITION_INDEPENDENT_CODE ON)
+target_include_directories(opspace_{name} PUBLIC ${{CMAKE_CURRENT_SOURCE_DIR}})
+target_link_libraries(opspace_{name} PUBLIC m)
+"""
 NAME = re.compile(r"[A-Za-z_]\w*", re.ASCII)
 TARGETS = {
     columns.POSITION: (3, 0, 0),
@@ -88,6 +99,7 @@ def export_c(
         f"{name}.h": _header(name, found).encode(),
         f"{name}.c": _source(name, found).encode(),
         "opspace_kernels.o": KERNELS.object(),
+        "CMakeLists.txt": CMAKE.format(name=name).encode(),
         **{path.name: path.read_bytes() for path in sorted(SOURCES.iterdir())},
     }
     directory = Path(directory)
@@ -100,7 +112,7 @@ def export_c(
 def _codes() -> str:
     """What a step answers, and what can be read after it."""
     codes = {f"OPSPACE_{one.name}": int(one) for one in (Status(0), *Status)}
-    refused = {"NOT_FINITE": -1, "NO_TASK": -2, "REFUSED": -3, "NO_WRENCH": -4}
+    refused = {"NOT_FINITE": -1, "NO_TASK": -2, "REFUSED": -3, "NO_WRENCH": -4, "BUSY": -5}
     codes |= {f"OPSPACE_{word}": code for word, code in refused.items()}
     enum = "".join(f"    {word} = {code},\n" for word, code in codes.items())
     read = "".join(

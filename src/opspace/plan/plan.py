@@ -30,6 +30,7 @@ from opspace.plan.pack_distances import PackedDistances
 from opspace.plan.pack_force import PackedForce, pack, presses_of
 from opspace.plan.pack_task import Packed
 from opspace.plan.scales import Scales
+from opspace.plan.spectra import Spectra
 from opspace.robots.adapter import AdapterBase
 from opspace.robots.motion_axes import MotionAxes
 from opspace.stack import Blending, Member, Variable, variables_of
@@ -152,6 +153,7 @@ class Plan:
         if limits is not None:
             _pack_limits(limits, scales, self.tick)
         self.handle = self.tick.handle()
+        self.spectra = Spectra(self.tick.option)
 
     @staticmethod
     def fits(members: Sequence[Member]) -> bool:

@@ -17,10 +17,8 @@ from opspace.command import (
     TaskStatus,
 )
 from opspace.kernels.columns import slot_bit
-from opspace.plan.entries import KERNELS
 from opspace.plan.memory import Reported
 from opspace.plan.pack_contacts import ContactTick
-from opspace.plan.records import SPECTRUM
 
 if TYPE_CHECKING:
     from opspace.plan.plan import Plan
@@ -154,12 +152,5 @@ class CompiledReport:
         present = [s for s in here if int(chosen) & slot_bit(s)]
         packed = [plan.packed[plan.places[s][1]] for s in present]
         first, rows = int(plan.first_kept[depth]), sum(p.task.rows for p in packed)
-        B = np.array(kept[first : first + rows, : int(width)])
-        sizes = {"fewer": min(B.shape), "more": max(B.shape)}
-        found = SPECTRUM.make(sizes, {"B": B, "option": plan.tick.option})
-        handle = found.handle()  # has to last as long as the call, which is given its address only
-        KERNELS["spectrum"](handle.address)
-        names = tuple(p.task.name for p in packed)
-        return LevelStatus(
-            level, names, found.sigma, found.activation, found.response, found.directions, scale
-        )
+        directions = plan.spectra.of(kept[first : first + rows, : int(width)])
+        return LevelStatus(level, tuple(p.task.name for p in packed), *directions, scale)

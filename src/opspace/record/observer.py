@@ -263,6 +263,8 @@ def _directions(controller: ReferenceController, level: Sequence[Task]) -> int:
 
 
 def _padded(values: np.ndarray, size: int) -> np.ndarray:
+    if values.size == size:
+        return values
     padded = np.full(size, np.nan)
     padded[: values.size] = values[:size]
     return padded

@@ -21,6 +21,19 @@ extern const char opspace_stamp[];
 /* Columns of an activation in time. */
 enum { PROFILE, TARGET, START, DURATION, PHASE, RATE, ACCELERATION, WIDTH, CRUISE };
 
+/* What is asked for between two steps, from any thread: a ring of letters. Whoever writes one takes a
+ * number, which is the only thing that writers share, and says by it that the letter is there; the step
+ * takes letters in order up to the first that is not. Nobody waits for anybody. */
+enum { LETTERS = 64 };
+enum { TARGET_LETTER, GAINS_LETTER, FORCE_LETTER, PRESENCE_LETTER };
+
+typedef struct {
+    unsigned turn; /* the number of its writer while it is empty, one more while it is full */
+    int what;
+    int task;
+    double *x;
+} letter;
+
 struct opspace {
     const opspace_model *model;
     uint64_t *words;
@@ -30,6 +43,9 @@ struct opspace {
     int64_t *kind, *endless;
     double before;
     int begun;
+    letter ring[LETTERS];
+    double *paper;
+    unsigned written, taken;
 };
 
 static const opspace_field *find_field(const opspace *c, const char *name)
@@ -82,6 +98,57 @@ static void find_fields(opspace *c)
     c->endless = memory_of(c, "endless");
 }
 
+/* Numbers of the longest letter. */
+static int longest(const opspace_model *m)
+{
+    int most = 12 + 6 + 6;
+    for (int i = 0; i < m->tasks; i++)
+        if (3 * m->task[i].rows > most)
+            most = 3 * m->task[i].rows;
+    return most;
+}
+
+static int make_ring(opspace *c)
+{
+    int size = longest(c->model);
+    c->paper = calloc((size_t)LETTERS * (size_t)size, sizeof *c->paper);
+    if (!c->paper)
+        return 0;
+    for (unsigned i = 0; i < LETTERS; i++) {
+        c->ring[i].turn = i;
+        c->ring[i].x = c->paper + i * (unsigned)size;
+    }
+    return 1;
+}
+
+/* Take the next empty letter; NULL where there is none. */
+static letter *empty_letter(opspace *c, int what, int task, unsigned *number)
+{
+    unsigned mine = __atomic_load_n(&c->written, __ATOMIC_RELAXED);
+    for (;;) {
+        letter *one = &c->ring[mine % LETTERS];
+        unsigned turn = __atomic_load_n(&one->turn, __ATOMIC_ACQUIRE);
+        if (turn == mine) {
+            if (__atomic_compare_exchange_n(
+                    &c->written, &mine, mine + 1, 0, __ATOMIC_RELAXED, __ATOMIC_RELAXED)) {
+                one->what = what;
+                one->task = task;
+                *number = mine;
+                return one;
+            }
+        } else if ((int)(turn - mine) < 0) {
+            return NULL;
+        } else {
+            mine = __atomic_load_n(&c->written, __ATOMIC_RELAXED);
+        }
+    }
+}
+
+static void send(letter *one, unsigned number)
+{
+    __atomic_store_n(&one->turn, number + 1, __ATOMIC_RELEASE);
+}
+
 opspace *opspace_open(const opspace_model *model)
 {
     if (!model || strcmp(model->stamp, opspace_stamp) != 0)
@@ -91,8 +158,8 @@ opspace *opspace_open(const opspace_model *model)
         return NULL;
     c->model = model;
     c->words = calloc((size_t)model->words, sizeof *c->words);
-    if (!c->words) {
-        free(c);
+    if (!c->words || !make_ring(c)) {
+        opspace_close(c);
         return NULL;
     }
     lay_out(c);
@@ -102,8 +169,10 @@ opspace *opspace_open(const opspace_model *model)
 
 void opspace_close(opspace *c)
 {
-    if (c)
+    if (c) {
         free(c->words);
+        free(c->paper);
+    }
     free(c);
 }
 
@@ -186,11 +255,14 @@ static int all_measured(const opspace *c)
     return 1;
 }
 
+static void read_letters(opspace *c);
+
 int64_t opspace_step(opspace *c, double t, const double *q, const double *v, double *tau)
 {
     const opspace_model *m = c->model;
     if (!isfinite(t) || !all_finite(q, m->nq) || !all_finite(v, m->n))
         return OPSPACE_NOT_FINITE;
+    read_letters(c);
     if (!all_measured(c))
         return OPSPACE_NO_WRENCH;
     int64_t timing = watch(c, t, q, v);
@@ -268,42 +340,62 @@ static int finite_or_none(const double *x, int count)
     return !x || all_finite(x, count);
 }
 
+/* Numbers of the velocity of a target. */
+static int speeds_of(const opspace_task *one)
+{
+    return one->joints ? one->joints : (one->position ? 3 : 0) + (one->orientation ? 3 : 0);
+}
+
 int opspace_set_target(
     opspace *c, int task, const double *x, const double *velocity, const double *acceleration)
 {
     const opspace_task *one = task_at(c, task);
     if (!one)
         return OPSPACE_NO_TASK;
-    int size = one->joints ? one->joints : (one->position ? 3 : 0) + (one->orientation ? 3 : 0);
-    int given = one->joints + one->position + one->orientation;
+    int size = speeds_of(one), given = one->joints + one->position + one->orientation;
     if (given == 0 || !all_finite(x, given) || !finite_or_none(velocity, size) || !finite_or_none(acceleration, size))
         return OPSPACE_REFUSED;
+    if (one->orientation && !is_rotation(x + one->position))
+        return OPSPACE_REFUSED;
+    unsigned number;
+    letter *letter = empty_letter(c, TARGET_LETTER, task, &number);
+    if (!letter)
+        return OPSPACE_BUSY;
+    copy(letter->x, x, given);
+    copy(letter->x + given, velocity, size);
+    copy(letter->x + given + size, acceleration, size);
+    send(letter, number);
+    return 0;
+}
+
+static void go_to_joints(opspace *c, const opspace_task *one, int64_t *kind, const double *x)
+{
+    if (joints_jump(c, one, x))
+        kind[KIND_REMEMBERS] = 0;
+    for (int i = 0; i < one->joints; i++)
+        for (int k = 0; k < 3; k++)
+            c->goal[3 * (one->first_row + i) + k] = x[k * one->joints + i];
+}
+
+static void go_to(opspace *c, int task, const double *x)
+{
+    const opspace_task *one = &c->model->task[task];
     int64_t *kind = c->kind + task * KIND_SIZE;
     if (one->joints) {
-        if (joints_jump(c, one, x))
-            kind[KIND_REMEMBERS] = 0;
-        for (int i = 0; i < size; i++) {
-            double *goal = c->goal + 3 * (one->first_row + i);
-            goal[0] = x[i];
-            goal[1] = velocity ? velocity[i] : 0.0;
-            goal[2] = acceleration ? acceleration[i] : 0.0;
-        }
-        return 0;
+        go_to_joints(c, one, kind, x);
+        return;
     }
     double *number = c->numbers + task * NUMBERS_SIZE;
-    const double *R = x + one->position;
+    const double *R = x + one->position, *speeds = R + one->orientation;
     if (one->orientation) {
-        if (!is_rotation(R))
-            return OPSPACE_REFUSED;
         if (rotation_jumps(number + NUMBERS_GOAL_ROTATION, R))
             kind[KIND_REMEMBERS] = 0;
         copy(number + NUMBERS_GOAL_ROTATION, R, 9);
     }
     if (one->position)
         copy(number + NUMBERS_GOAL_POSITION, x, 3);
-    copy(number + NUMBERS_GOAL_VELOCITY, velocity, size);
-    copy(number + NUMBERS_GOAL_ACCELERATION, acceleration, size);
-    return 0;
+    copy(number + NUMBERS_GOAL_VELOCITY, speeds, speeds_of(one));
+    copy(number + NUMBERS_GOAL_ACCELERATION, speeds + speeds_of(one), speeds_of(one));
 }
 
 int opspace_set_gains(opspace *c, int task, const double *kp, const double *kv)
@@ -318,8 +410,13 @@ int opspace_set_gains(opspace *c, int task, const double *kp, const double *kv)
     for (int i = 0; i < one->rows; i++)
         if (!isfinite(kp[i]) || !isfinite(kv[i]) || kp[i] < 0.0 || kv[i] < 0.0)
             return OPSPACE_REFUSED;
-    copy(c->kp + one->first_row, kp, one->rows);
-    copy(c->kv + one->first_row, kv, one->rows);
+    unsigned number;
+    letter *letter = empty_letter(c, GAINS_LETTER, task, &number);
+    if (!letter)
+        return OPSPACE_BUSY;
+    copy(letter->x, kp, one->rows);
+    copy(letter->x + one->rows, kv, one->rows);
+    send(letter, number);
     return 0;
 }
 
@@ -347,7 +444,12 @@ int opspace_set_force(opspace *c, int task, const double *force)
         size += force[i] * force[i];
     if (sqrt(size) < row[PRESS_ON])
         return OPSPACE_REFUSED;
-    copy(row + PRESS_WANTED, force, one->rows);
+    unsigned number;
+    letter *letter = empty_letter(c, FORCE_LETTER, task, &number);
+    if (!letter)
+        return OPSPACE_BUSY;
+    copy(letter->x, force, one->rows);
+    send(letter, number);
     return 0;
 }
 
@@ -407,19 +509,32 @@ int opspace_set_presence(opspace *c, int task, int present, double t, double dur
         return OPSPACE_NO_TASK;
     if (!isfinite(t) || !isfinite(duration) || duration < 0.0)
         return OPSPACE_REFUSED;
-    double *x = c->variable + task * VARIABLE_SIZE, target = present ? 1.0 : 0.0;
+    unsigned number;
+    letter *letter = empty_letter(c, PRESENCE_LETTER, task, &number);
+    if (!letter)
+        return OPSPACE_BUSY;
+    letter->x[0] = present ? 1.0 : 0.0;
+    letter->x[1] = t;
+    letter->x[2] = duration;
+    send(letter, number);
+    return 0;
+}
+
+static void let_come_or_go(opspace *c, int task, double target, double t, double duration)
+{
+    double *x = c->variable + task * VARIABLE_SIZE;
     double s, rate, acceleration;
     if ((x[DURATION] == 0.0 || t >= x[START] + x[DURATION]) && x[TARGET] == target)
-        return 0;
+        return;
     if (duration < 1e-9) {
         write_ramp(x, target, t, 0.0, target, 0.0, 0.0, 0.0, 0.0);
-        return 0;
+        return;
     }
     phase_at(x, t, &s, &rate, &acceleration);
     if (!(s > 0.0 && s < 1.0)) {
         double edge = fmin(fmax(s, 0.0), 1.0), cruise = (target - edge) / duration;
         write_ramp(x, target, t, duration, edge, cruise, 0.0, 0.0, cruise);
-        return 0;
+        return;
     }
     double blend = 0.5 * duration;
     if (rate != 0.0)
@@ -429,7 +544,33 @@ int opspace_set_presence(opspace *c, int task, int present, double t, double dur
     double covered = blend * (rate / 2.0 + blend * acceleration / 12.0);
     double cruise = (target - s - covered) / (duration - 0.5 * blend);
     write_ramp(x, target, t, duration, s, rate, acceleration, blend, cruise);
-    return 0;
+}
+
+/* Do what is asked for; a letter that is being written waits for the next step. */
+static void read_letters(opspace *c)
+{
+    for (int i = 0; i < LETTERS; i++) {
+        letter *one = &c->ring[c->taken % LETTERS];
+        if (__atomic_load_n(&one->turn, __ATOMIC_ACQUIRE) != c->taken + 1)
+            return;
+        const opspace_task *task = &c->model->task[one->task];
+        switch (one->what) {
+        case TARGET_LETTER:
+            go_to(c, one->task, one->x);
+            break;
+        case GAINS_LETTER:
+            copy(c->kp + task->first_row, one->x, task->rows);
+            copy(c->kv + task->first_row, one->x + task->rows, task->rows);
+            break;
+        case FORCE_LETTER:
+            copy(press_of(c, one->task) + PRESS_WANTED, one->x, task->rows);
+            break;
+        default:
+            let_come_or_go(c, one->task, one->x[0], one->x[1], one->x[2]);
+        }
+        __atomic_store_n(&one->turn, c->taken + LETTERS, __ATOMIC_RELEASE);
+        c->taken++;
+    }
 }
 
 void opspace_restart(opspace *c)

@@ -1,8 +1,10 @@
 /* An exported controller of opspace: from time and state to torque, without Python.
  *
  * Link opspace.c, the file of the controller, the kernels and the mathematics library (-lm). Nothing
- * here locks, and only opspace_open allocates. One thread at a time may use a controller; different
- * controllers, also of one model, are independent. Units are SI and radians, rotations 3 x 3 by rows.
+ * here locks, and only opspace_open allocates. Targets, gains, forces and what comes and goes may be
+ * asked for from any thread at any time, and neither that thread nor the step waits; everything else
+ * is for the thread that steps. Different controllers, also of one model, are independent. Units are SI
+ * and radians, rotations 3 x 3 by rows.
  */
 #ifndef OPSPACE_H
 #define OPSPACE_H
@@ -86,7 +88,8 @@ int opspace_find_task(const opspace *controller, const char *name);
  *
  * x is a position (3), then a rotation (9), or joint positions, as the task has them; velocity and
  * acceleration are 3 numbers for each of position and rotation, or one for each joint, NULL for zero.
- * Returns 0, OPSPACE_NO_TASK or OPSPACE_REFUSED: a number is not finite, or x holds no rotation. */
+ * Returns 0, OPSPACE_NO_TASK or OPSPACE_REFUSED: a number is not finite, or x holds no rotation; or
+ * OPSPACE_BUSY, as everything that may be asked from any thread: 64 wishes wait for the next step. */
 int opspace_set_target(
     opspace *controller, int task, const double *x, const double *velocity,
     const double *acceleration);
@@ -97,7 +100,8 @@ int opspace_set_target(
  * OPSPACE_REFUSED: a gain is negative or not finite, or is no force task's. */
 int opspace_set_gains(opspace *controller, int task, const double *kp, const double *kv);
 
-/* Give a force task the wrench that the robot exerts on the environment, measured at time t.
+/* Give a force task the wrench that the robot exerts on the environment, measured at time t; from the
+ * thread that steps.
  *
  * wrench is 3 N and 3 N*m in world axes at the point of the task. No step is made before every force
  * task has had one; after 10 ms without a new one the status says OPSPACE_WRENCH_STALE. Returns 0,
@@ -117,7 +121,8 @@ int opspace_set_force(opspace *controller, int task, const double *force);
  * was exported with. Returns 0, OPSPACE_NO_TASK or OPSPACE_REFUSED. */
 int opspace_set_presence(opspace *controller, int task, int present, double t, double duration);
 
-/* Multiply the presence of a task by an activation of one's own, from 0 to 1.
+/* Multiply the presence of a task by an activation of one's own, from 0 to 1; from the thread that
+ * steps.
  *
  * It is the caller's to change it smoothly. Returns 0, OPSPACE_NO_TASK or OPSPACE_REFUSED. */
 int opspace_set_activation(opspace *controller, int task, double activation);
