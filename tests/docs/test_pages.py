@@ -113,7 +113,7 @@ def test_the_programs_are_found():
     assert {"README.md", "docs/theory.md", "docs/tutorial.md", "docs/how-to/mujoco.md"} <= found
     unknown = {block.language for page in PAGES for block in blocks_of(page)}
     # Patches are applied and used by test_worked_examples, C is compiled by export/test_c_library.
-    assert unknown <= {"python", "sh", "yaml", "xml", "text", "diff", "c"}
+    assert unknown <= {"python", "sh", "yaml", "xml", "text", "diff", "c", "cmake"}
 
 
 def parse_opspace(words):

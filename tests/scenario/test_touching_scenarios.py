@@ -91,17 +91,26 @@ def test_a_shipped_scenario_presses_with_what_it_says(name):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("name", "force", "step"), [("wipe", 10.0, 1.2), ("button", 15.0, 1.2), ("edge", 10.0, 1.2)]
+    ("name", "force", "step", "peak"),
+    [
+        ("wipe", 10.0, 1.2, 60.0),
+        ("button", 15.0, 1.2, 60.0),
+        ("edge", 10.0, 0.8, 35.0),
+        ("push", 10.0, 1.3, 20.0),
+    ],
 )
-def test_a_shipped_scenario_ends_with_its_force_and_without_a_jolt(name, force, step):
+def test_a_shipped_scenario_ends_with_its_force_and_without_a_jolt(name, force, step, peak):
     built = build(load_scenario(name))
-    tau = []
+    normal = np.array(load_scenario(name).plant.surfaces[0].normal)
+    tau, pushed = [], []
     for i in range(round(built.scenario.duration / built.scenario.dt)):
         q, v = built.plant.measure()
         wrenches = built.plant.wrenches()
         tau.append(built.controller.step(i * built.scenario.dt, q, v, wrenches=wrenches).tau)
+        pushed.append(-float(normal @ built.plant.exerted[:3]))
         built.plant.advance(tau[-1])
-    assert -built.plant.exerted[2] == pytest.approx(force, abs=0.5)
+    assert pushed[-1] == pytest.approx(force, abs=0.5)
+    assert max(pushed) <= peak
     assert np.max(np.abs(np.diff(tau, axis=0))) <= step
 
 
