@@ -12,6 +12,7 @@ from opspace.export.c_library import export_c
 from opspace.plan.entries import KERNELS
 from opspace.plan.image import image
 from opspace.stack import Blending
+from tests.controller.test_uneven_motors import uneven
 from tests.docs.pages import DOCS, commands_of
 from tests.docs.test_pages import programs_of, run_blocks
 
@@ -314,6 +315,25 @@ int main(void)
     return EXIT_SUCCESS;
 }
 """
+
+
+@with_cc
+@pytest.mark.parametrize("fast", [10.0, 1e152, 1e160])
+def test_motors_that_give_more_one_way_and_brakes_give_the_same_bits(fast, tmp_path):
+    robot = uneven(-0.3, 1.5)
+    robot.update(robot.q_reference, np.zeros(7))
+    hand = osc.PositionTask(target=robot.position(robot.tool) + 0.05)
+    stack = osc.Stack([osc.JointLimits(), hand, osc.PostureTask(target=robot.q_reference)])
+    controller = osc.Controller(robot, stack, torque_limits="priority", period=1e-3)
+    c = InC(tmp_path, controller)
+    least, most = robot.torque_range
+    for k, v in enumerate([np.zeros(7), fast * np.array([1.0, -1.0] * 3 + [1.0])]):
+        command = controller.step(1e-3 * k, robot.q_reference, v)
+        status, tau = c.step(1e-3 * k, robot.q_reference, v)
+        np.testing.assert_array_equal(tau, command.tau)
+        assert status == command.status
+        assert np.all((least - 1e-9 <= tau) & (tau <= most + 1e-9))
+    assert (osc.Status.FAULT in command.status) == (fast > 1e3)
 
 
 CMAKE = """

@@ -38,7 +38,7 @@ struct opspace {
     const opspace_model *model;
     uint64_t *words;
     void *handle;
-    double *q, *v, *tau, *M, *bias, *torque_limit, *option;
+    double *q, *v, *tau, *M, *bias, *torque_limit, *torque_middle, *option;
     double *gravity, *variable, *own, *numbers, *goal, *kp, *kv, *press;
     int64_t *kind, *endless;
     double before;
@@ -85,6 +85,7 @@ static void find_fields(opspace *c)
     c->M = memory_of(c, "M");
     c->bias = memory_of(c, "bias");
     c->torque_limit = memory_of(c, "torque_limit");
+    c->torque_middle = memory_of(c, "torque_middle");
     c->option = memory_of(c, "option");
     c->gravity = memory_of(c, "gravity");
     c->variable = memory_of(c, "variable");
@@ -222,8 +223,9 @@ static void brake(const opspace *c, double *tau)
     int n = c->model->n;
     for (int i = 0; i < n; i++) {
         double most = fmin(c->torque_limit[i], 1.7976931348623157e308);
-        double x = c->bias[i] - c->option[OPTION_DAMPING] * c->M[i * n + i] * c->v[i];
-        tau[i] = isnan(x) ? 0.0 : fmax(fmin(x, most), -most);
+        double middle = c->torque_middle[i];
+        double x = c->bias[i] - c->option[OPTION_DAMPING] * c->M[i * n + i] * c->v[i] - middle;
+        tau[i] = isnan(x) ? 0.0 : fmax(fmin(x, most), -most) + middle;
     }
 }
 
