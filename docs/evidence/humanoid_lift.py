@@ -12,6 +12,7 @@ import sys
 import mujoco
 import numpy as np
 from buffer_document import DOCS, EVIDENCE, read_csv, write_csv
+from g1_on_soles import g1_on_soles
 
 import opspace as osc
 from opspace.pictures.offscreen import View, canvas
@@ -27,8 +28,6 @@ from opspace.plots.style import (
 
 CSV = EVIDENCE / "humanoid_lift.csv"
 PICTURE = DOCS / "images" / "humanoid.png"
-HALF, OFFSET = (0.085, 0.025), (0.035, 0.0, -0.035)
-"""Half the sides of a sole, and its middle in the frame of the ankle, m."""
 END = 5.4
 MOMENTS = (0.1, 2.55, 5.3)
 """Times of the pictures, s."""
@@ -42,15 +41,8 @@ class Lift:
     """G1 leans over its left foot, lifts the right one, and reaches out with the hand."""
 
     def __init__(self, *, hard: bool) -> None:
-        self.robot = robot = osc.load_robot("g1")
-        self.hard = hard
-        soles = [
-            osc.SoleContact(f"{side}_ankle_roll_link", HALF, offset=OFFSET, name=side)
-            for side in ("left", "right")
-        ]
-        robot.update(robot.q_reference, np.zeros(robot.nv))
-        q = robot.q_reference.copy()
-        q[2] -= robot.position(robot.frame_id("left_ankle_roll_link"))[2] + OFFSET[2]
+        robot, soles, q = g1_on_soles()
+        self.robot, self.hard = robot, hard
         robot.update(q, np.zeros(robot.nv))
         here = robot.com_position().copy()
         over = here + (0.03, 0.0, 0.0)

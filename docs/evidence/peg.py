@@ -12,6 +12,7 @@ import math
 from pathlib import Path
 
 import numpy as np
+from PIL import Image
 
 from opspace.plots import save, style
 from opspace.robots import load_robot
@@ -21,6 +22,8 @@ from opspace.tasks.rotation import exp_rotation
 
 RUNS = 20
 OFF, LEAN = 2e-3, math.radians(1.0)
+COLORS = 128
+"""Of the picture: twenty thin lines are large in all their shades."""
 ABOVE = 0.0105
 """How far above the plate the peg begins, m."""
 
@@ -83,7 +86,11 @@ def draw(runs: list[np.ndarray], path: Path) -> Path:
     for ax, name in zip(axes, names, strict=True):
         style.dress(ax, x="time [s]" if name == names[-1] else "", y=name)
     axes[0].axhline(0.0, color=style.FAINT, linewidth=1.0, linestyle=":")
-    return save(figure, path)
+    save(figure, path)
+    with Image.open(path) as drawn:
+        few = drawn.convert("RGB").quantize(COLORS, dither=Image.Dither.NONE)
+    few.save(path, optimize=True)
+    return path
 
 
 def main() -> None:

@@ -17,6 +17,7 @@ from typing import NamedTuple
 import numpy as np
 from buffer_document import DOCS, EVIDENCE, number, read_csv, replace_block, write_csv
 from buffer_document import table as markdown_table
+from g1_on_soles import g1_on_soles
 
 import opspace as osc
 from opspace.compare.humanoid import ten_to_one
@@ -24,8 +25,6 @@ from opspace.controller.reference import ReferenceController
 
 CSV = EVIDENCE / "pushes.csv"
 DOCUMENT = DOCS / "safety.md"
-HALF, OFFSET = (0.085, 0.025), (0.035, 0.0, -0.035)
-"""Half the sides of a sole, and its middle in the frame of the ankle, m."""
 TICK, AT, AFTER = 2e-3, 0.02, 2.5
 """Time of a tick, of the push, and for how long a robot is watched after it, s."""
 STOOD, STILL = 4e-3, 0.3
@@ -68,14 +67,7 @@ def draw(which: int) -> tuple[float, float, float, str]:
 def stand_and_be_pushed(which: int, law: str) -> tuple[bool, float, float]:
     """Whether G1 stands afterwards, its largest torque step, and the error of its centre of mass."""
     impulse, angle, duration, frame = draw(which)
-    robot = osc.load_robot("g1")
-    soles = [
-        osc.SoleContact(f"{side}_ankle_roll_link", HALF, offset=OFFSET, name=side)
-        for side in ("left", "right")
-    ]
-    robot.update(robot.q_reference, np.zeros(robot.nv))
-    q = robot.q_reference.copy()
-    q[2] -= robot.position(robot.frame_id("left_ankle_roll_link"))[2] + OFFSET[2]
+    robot, soles, q = g1_on_soles()
     torso = osc.OrientationTask("torso_link", name="torso")
     tasks = [osc.JointLimits(), osc.ComTask(), torso, osc.PostureTask(kp=25.0)]
     stack = osc.Stack(tasks, contacts=soles)

@@ -34,23 +34,28 @@ def floats(size=None):
     return np.float32(CHANCE.normal(size=size)).tolist()
 
 
+def motor_command_fields(mode):
+    numbers = {name: floats() for name in ("q", "dq", "tau", "kp", "kd")}
+    return Fields(mode=mode, **numbers, reserve=0)
+
+
+def motor_state_fields():
+    numbers = {name: floats() for name in ("q", "dq", "tau_est")}
+    rest = {"temperature": [0, 0], "vol": 0.0, "sensor": [0, 0], "motorstate": 0}
+    return Fields(mode=0, **numbers, ddq=0.0, **rest, reserve=[0] * 4)
+
+
 def command_fields():
-    motor = lambda k: Fields(  # noqa: E731
-        mode=int(k < 29), q=floats(), dq=floats(), tau=floats(), kp=floats(), kd=floats(), reserve=0
-    )
     return Fields(
         mode_pr=0,
         mode_machine=5,
-        motor_cmd=[motor(k) for k in range(MOTORS)],
+        motor_cmd=[motor_command_fields(int(k < 29)) for k in range(MOTORS)],
         reserve=[0] * 4,
         crc=0,
     )
 
 
 def state_fields():
-    motor = Fields(mode=0, ddq=0.0, temperature=[0, 0], vol=0.0, sensor=[0, 0])
-    rest = {"motorstate": 0, "reserve": [0] * 4}
-    one = lambda: Fields(q=floats(), dq=floats(), tau_est=floats(), **vars(motor), **rest)  # noqa: E731
     imu = Fields(
         quaternion=[0.0] * 4,
         gyroscope=[0.0] * 3,
@@ -64,7 +69,7 @@ def state_fields():
         mode_machine=7,
         tick=2**32 - 3,
         imu_state=imu,
-        motor_state=[one() for _ in range(MOTORS)],
+        motor_state=[motor_state_fields() for _ in range(MOTORS)],
         wireless_remote=[0] * 40,
         reserve=[0] * 4,
         crc=0,
@@ -115,8 +120,6 @@ def test_the_checksum_is_that_of_the_robots_structure():
     assert command.checksum() == checksum_bit_by_bit(structure[:-4].view("<u4").tolist())
     command.motors["kp"][3] = 1.0
     assert not command.whole
-    # The check value of the catalogue of such sums: nine letters are no words, so that only here
-    # the reference itself is checked.
     assert checksum_bit_by_bit([0]) == 0xC704DD7B
 
 
@@ -221,5 +224,7 @@ def test_a_robot_behind_dds_goes_to_a_target_and_nobody_else_may_drive_it():
         assert loop.report.completed, loop.report.reason
         robot.update(loop.history.q[-1], np.zeros(6))
         assert np.abs(robot.position("tool") - goal).max() < 5e-3
+        again = osc.Loop(controller, driver(), patience=3000, handover=0.1).run(0.2)
+        assert again.completed, again.reason
     assert account["reflexes"] == account["silences"] == 0
     assert account["fastest"] < 0.02

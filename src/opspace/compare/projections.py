@@ -9,12 +9,13 @@ from numpy.typing import ArrayLike
 
 from opspace.command import Command, Status
 from opspace.controller import Controller
+from opspace.controller.collisions import closing
 from opspace.controller.wrenches import Wrenches
 from opspace.errors import InputError
 from opspace.kernels.columns import KEEP_TORQUE
 from opspace.law import nearest_acceleration
 from opspace.law.convex import box_distance
-from opspace.law.scalars import closing_command, level_weight
+from opspace.law.scalars import level_weight
 from opspace.machine.field_table import Record
 from opspace.plan.plan import Plan
 from opspace.tasks import CollisionAvoidance
@@ -231,9 +232,4 @@ def _distances(
     D, rate = np.array(tick.distance) - guard.margin, np.einsum("ki,ki->k", n, v)
     share = d.share[sets]
     own = np.where(share > 0.0, np.einsum("ki,ki->k", n, ball[:, 3:6]), rate)
-    told = zip(D.tolist(), rate.tolist(), own.tolist(), share.tolist(), strict=True)
-    asked = [
-        closing_command(x, -y, -part, s or 1.0, guard.brake, guard.k1, guard.k2)
-        for x, y, part, s in told
-    ]
-    return D, rate, np.array(d.most) - asked
+    return D, rate, np.array(d.most) - closing(guard, D, rate, own, share)

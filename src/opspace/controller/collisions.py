@@ -55,12 +55,21 @@ def _most(
     """Say how fast each distance may shrink faster, (rows,) m/s²."""
     shared = share > 0.0
     own = np.where(shared, rows.own_rate, rows.rate)
-    told = zip(D.tolist(), rows.rate.tolist(), own.tolist(), share.tolist(), strict=True)
-    most = [
-        closing_command(d, -rate, -part, s or 1.0, guard.brake, guard.k1, guard.k2)
-        for d, rate, part, s in told
-    ]
-    return np.array(most) + np.where(shared, rows.own_drift, rows.drift)
+    drift = np.where(shared, rows.own_drift, rows.drift)
+    return closing(guard, D, rows.rate, own, share) + drift
+
+
+def closing(
+    guard: CollisionAvoidance, D: np.ndarray, rate: np.ndarray, own: np.ndarray, share: np.ndarray
+) -> np.ndarray:
+    """Evaluate `opspace.law.scalars.closing_command` for every row, (rows,) m/s²; share 0 is alone."""
+    told = zip(D.tolist(), rate.tolist(), own.tolist(), share.tolist(), strict=True)
+    return np.array(
+        [
+            closing_command(d, -speed, -part, s or 1.0, guard.brake, guard.k1, guard.k2)
+            for d, speed, part, s in told
+        ]
+    )
 
 
 def rows_of(layout: DistanceLayout, robot: Robot, placings: Sequence[Placing]) -> DistanceRows:

@@ -21,8 +21,7 @@ HEAD = len(PLAIN_LITTLE_ENDIAN)
 
 # Plain CDR fills up to the size of the next number only, so that the mode of the first motor moves
 # into what is filled up before it; those of the others lie as in an array of structures of C.
-_COMMAND_START, _COMMAND_MOTOR = 0, 28
-_COMMAND_MODE = 2
+_COMMAND_MOTOR, _COMMAND_MODE = 28, 2
 COMMAND_SIZE = 1000
 _MOTOR_COMMAND = np.dtype(
     {
@@ -93,8 +92,7 @@ class CommandBytes:
         self.body = np.zeros(COMMAND_SIZE, np.uint8)
         if body is not None:
             self.body[:] = np.frombuffer(body, np.uint8, COMMAND_SIZE)
-        end = _COMMAND_START + MOTORS * _COMMAND_MOTOR
-        self.motors = self.body[_COMMAND_START:end].view(_MOTOR_COMMAND)
+        self.motors = self.body[: MOTORS * _COMMAND_MOTOR].view(_MOTOR_COMMAND)
         self._sum = self.body[-4:].view("<u4")
 
     def enable(self, motors: np.ndarray, mode_machine: int) -> None:
@@ -169,7 +167,7 @@ def messages() -> Messages:
     """Declare the messages to `cyclonedds`.
 
     They are written and read as a whole: to go through them field by field, as the library does,
-    takes it half a millisecond each.
+    takes it 0.4 ms each.
 
     Raises:
         MissingExtraError: `cyclonedds` is not installed.
