@@ -48,28 +48,39 @@ class Bounds:
             else:
                 lower[term.side.index] = -term.command
         # Who must stop at once may do so, whatever the speed limit behind it would say.
-        apart = np.maximum(lower - upper, 0.0)
-        lower, upper = lower - np.minimum(haste[1], apart), upper + np.minimum(haste[0], apart)
+        upper += np.minimum(haste[0], np.maximum(lower - upper, 0.0))
+        lower -= np.minimum(haste[1], np.maximum(lower - upper, 0.0))
         object.__setattr__(self, "lower", lower)
         object.__setattr__(self, "upper", upper)
 
-    def near(self, acceleration: np.ndarray) -> bool:
-        """Tell whether a limit acts or would act if its joint did more by its margin."""
-        return any(
-            term.side.sign * acceleration[term.side.index] > term.command - term.margin
-            for term in self.terms
-        )
+    def more(self, change: np.ndarray) -> np.ndarray:
+        """Return what joints do more towards their limits, (limits,) rad/s².
 
-    def after(self, change: np.ndarray) -> Bounds:
-        """Return what may be asked for when accelerations go on to change, (n,) rad/s².
-
-        What a joint does more towards its limit is taken off, up to the margin of the limit.
+        Args:
+            change: (n,) by how much their accelerations go on to change, rad/s².
         """
-        terms: list[LimitTerms] = []
-        for term in self.terms:
-            more = term.side.sign * float(change[term.side.index])
-            terms.append(term._replace(command=term.command - min(max(more, 0.0), term.margin)))
+        towards = [term.side.sign * change[term.side.index] for term in self.terms]
+        return np.maximum(towards, 0.0)
+
+    def after(self, more: np.ndarray) -> Bounds:
+        """Return what may be asked for where joints go on to do more, (limits,) rad/s².
+
+        What a joint does more towards one limit it does less towards the other, which gives way.
+        """
+        terms = [
+            term._replace(
+                command=term.command - taken, haste=term.haste + taken, last=term.last - taken
+            )
+            for term, taken in zip(self.terms, more, strict=True)
+        ]
         return replace(self, terms=terms)
+
+    def passed(self, acceleration: np.ndarray) -> bool:
+        """Tell whether a joint does more towards a limit than that one allows."""
+        return any(
+            t.side.sign * acceleration[t.side.index] - t.command > LOST * max(1.0, abs(t.command))
+            for t in self.terms
+        )
 
     def lost(self, acceleration: np.ndarray) -> bool:
         """Tell whether a joint does more than it may, or will pass its limit."""

@@ -143,8 +143,10 @@ class Controller(ReferenceController):
             catch_up()
         timing = 0  # a number: the operators of flags cost as much as all of Python here
         if watch is not None:
-            robot.check_state(robot.q, robot.v)
-            timing = int(watch.check(t, robot.q, robot.v))
+            q, v = robot.q, robot.v
+            if not isfinite(q.dot(q) + v.dot(v)):
+                robot.check_state(q, v)
+            timing = watch.check(t, q, v)
             if timing & TIME_JUMP and self._holds:
                 self._begin_anew()
                 return self._hold(t, STATUSES[timing])

@@ -417,7 +417,7 @@ class ReferenceController:
         if self._loading is not None:
             self._load(t)
         robot.update(numbers(q, "q"), numbers(v, "v"))
-        timing = Status.OK if self._timing is None else self._timing.check(t, robot.q, robot.v)
+        timing = Status(0 if self._timing is None else self._timing.check(t, robot.q, robot.v))
         if timing & Status.TIME_JUMP and self._holds:
             self._begin_anew()
             return self._hold(t, timing)

@@ -40,7 +40,7 @@ from opspace.law import (
     whiten,
 )
 from opspace.law.blending import combined
-from opspace.law.scalars import SCALED, room_for
+from opspace.law.scalars import LOOKS, SCALED, SEEN, room_for
 from opspace.plan.scales import Scales
 from opspace.robots.adapter import spread_of
 from opspace.robots.protocol import Robot
@@ -422,12 +422,8 @@ def keep_bounds(
         room = k.torque_limit if rules.keep_torque else np.full(k.v.size, np.inf)
         bounds = Bounds(keeps, k.M, k.bias, room, distances)
         kept = realise(bounds, tau, lambda: metric(L, tasks))
-        acceleration = np.linalg.solve(k.M, kept.tau - k.bias)
-        if looks_ahead(k) and bounds.near(acceleration):
-            own = kept.tau if k.reaction is None else kept.tau - k.reaction
-            own = own + k.torque_middle
-            change = change_within_tick(k.robot, own, acceleration, rules.period)
-            kept = realise(bounds.after(change), tau, lambda: metric(L, tasks))
+        if keeps and looks_ahead(k):
+            kept = look_through(k, bounds, tau, kept, lambda: metric(L, tasks))
     if observer is not None:
         observer.remember(k.t, k.v, np.linalg.solve(k.M, kept.tau - k.bias))
     return kept
@@ -436,6 +432,33 @@ def keep_bounds(
 def looks_ahead(k: Given) -> bool:
     """Tell whether the change of accelerations within a tick counts: not with joints that follow."""
     return k.rules.period > 0.0 and k.q.size == k.v.size and spread_of(k.robot) is None
+
+
+def look_through(
+    k: Given, bounds: Bounds, tau: np.ndarray, kept: Kept, metric: Callable[[], np.ndarray]
+) -> Kept:
+    """Keep the bounds of the mean acceleration, that of the middle of the tick."""
+    taken_off = np.zeros(len(bounds.terms))
+    for _ in range(LOOKS):
+        more = bounds.more(middle(k, kept)[1])
+        if np.all(np.abs(more - taken_off) <= SEEN * np.maximum(1.0, more)):
+            return kept
+        taken_off = more
+        kept = realise(bounds.after(more), tau, metric)
+        if Status.FILTERED not in kept.status:
+            return kept
+    acceleration, change = middle(k, kept)
+    if bounds.passed(acceleration + change):
+        return kept._replace(status=kept.status | Status.LIMIT_LOST)
+    return kept
+
+
+def middle(k: Given, kept: Kept) -> tuple[np.ndarray, np.ndarray]:
+    """Accelerations at the beginning of the tick, and their change until its middle, (n,) rad/s²."""
+    acceleration = np.linalg.solve(k.M, kept.tau - k.bias)
+    own = kept.tau if k.reaction is None else kept.tau - k.reaction
+    change = change_within_tick(k.robot, own + k.torque_middle, acceleration, k.rules.period)
+    return acceleration, change
 
 
 def metric(L: np.ndarray, tasks: Blend) -> np.ndarray:

@@ -17,6 +17,7 @@ MISSED = 1.5
 """A tick that comes later than this many periods after the one before has missed one."""
 JUMP = 10.0
 """Time that moves by more than this many periods has jumped."""
+TIME_JUMP, LATE, STALE = int(Status.TIME_JUMP), int(Status.LATE), int(Status.STALE)
 
 
 class Watchdog:
@@ -38,13 +39,13 @@ class Watchdog:
             raise unknown_name("on_time_jump", policy, POLICIES)
         self.period = float(period)
         self.policy = policy
-        self._before: tuple[float, np.ndarray, np.ndarray] | None = None
+        self._before: tuple[float, bytes, bytes] | None = None
 
     def forget(self) -> None:
         """Forget the tick before: whatever time and state come next are right."""
         self._before = None
 
-    def check(self, t: float, q: np.ndarray, v: np.ndarray) -> Status:
+    def check(self, t: float, q: np.ndarray, v: np.ndarray) -> int:
         """Compare a tick with the one before.
 
         Args:
@@ -53,27 +54,29 @@ class Watchdog:
             v: Velocity, (n,), rad/s.
 
         Returns:
-            ``LATE``, ``TIME_JUMP`` and ``STALE`` where they hold.
+            ``LATE``, ``TIME_JUMP`` and ``STALE`` where they hold, in the numbers of `opspace.Status`.
 
         Raises:
             InputError: Time ran backwards or jumped, and the policy is to raise.
         """
-        before, self._before = self._before, (t, np.array(q), np.array(v))
+        # Bytes are compared in a tenth of the time of arrays.
+        where, how_fast = q.tobytes(), v.tobytes()
+        before, self._before = self._before, (t, where, how_fast)
         if before is None:
-            return Status.OK
-        status = Status.OK
+            return 0
+        bits = 0
         passed = t - before[0]
         # Times are sums of floating-point numbers: a millionth of a period is no time.
         if not 1e-6 * self.period < passed <= JUMP * self.period:
-            status |= Status.TIME_JUMP
+            bits = TIME_JUMP
             if self.policy == "raise":
                 raise InputError(
                     f"time went from {before[0]:.6g} s to {t:.6g} s; a tick every "
                     f"{self.period:g} s was announced"
                 )
         elif passed > MISSED * self.period:
-            status |= Status.LATE
+            bits = LATE
         # A robot that moves cannot be where it was, to the last bit.
-        if np.any(v) and np.array_equal(q, before[1]) and np.array_equal(v, before[2]):
-            status |= Status.STALE
-        return status
+        if where == before[1] and how_fast == before[2] and v.any():
+            bits |= STALE
+        return bits

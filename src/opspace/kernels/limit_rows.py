@@ -39,7 +39,7 @@ from opspace.kernels.limit_columns import (
 )
 from opspace.kernels.projection import nearest_acceleration, task_metric
 from opspace.kernels.task_rows import joint_position
-from opspace.law.scalars import BROKEN, LOST, UNBOUNDED
+from opspace.law.scalars import BROKEN, LOOKS, LOST, SEEN, UNBOUNDED
 from opspace.machine.jit import jit
 
 FILTERED = int(Status.FILTERED)
@@ -146,15 +146,37 @@ def keep_bounds(work, stacks):
     for a in range(n):
         work.wanted_acceleration[a], work.wanted_tau[a] = x[a], work.tau[a]
     kept = realise(work, stacks, n)
-    if (
-        work.option[PERIOD] > 0.0
-        and work.option[LIMIT_BOUND] != 0.0
-        and _near(work)
-        and look_ahead(work, n)
-    ):
+    if work.option[PERIOD] > 0.0 and work.option[LIMIT_BOUND] != 0.0:
+        kept = look_through(work, stacks, n, kept)
+    return kept
+
+
+@jit
+def look_through(work, stacks, n, kept):
+    """Keep the bounds of the mean acceleration, that of the middle of the tick.
+
+    Args:
+        work: `opspace.plan.records.TICK`.
+        stacks: Number of stacks that were blended.
+        n: Number of joints.
+        kept: What happened so far, in the numbers of `opspace.Status`.
+
+    Returns:
+        What happened.
+    """
+    x = work.joint_acceleration
+    for _ in range(LOOKS):
+        if not _evaluate_middle(work, n) or _same_as_taken_off(work):
+            return kept
+        for i in range(work.limit.shape[0]):
+            work.limit[i, SHIFT] = _more(work, i)
         for a in range(n):
             x[a], work.tau[a] = work.wanted_acceleration[a], work.wanted_tau[a]
         kept = realise(work, stacks, n)
+        if kept & FILTERED == 0:
+            return kept
+    if _evaluate_middle(work, n) and _passes_in_the_middle(work):
+        kept |= LIMIT_LOST
     return kept
 
 
@@ -212,18 +234,7 @@ def will_pass(work):
     """Whether a joint that is too fast does not brake enough to stop at its limit."""
     for i in range(work.limit.shape[0]):
         limit = work.limit[i]
-        if limit[SIGN] * work.joint_acceleration[work.limit_joint[i]] > limit[LAST]:
-            return True
-    return False
-
-
-@jit
-def _near(work):
-    """Whether a limit acts, or would act if its joint did more by its margin."""
-    for i in range(work.limit.shape[0]):
-        limit = work.limit[i]
-        towards = limit[SIGN] * work.joint_acceleration[work.limit_joint[i]]
-        if towards > limit[COMMAND] - limit[MARGIN]:
+        if limit[SIGN] * work.joint_acceleration[work.limit_joint[i]] > limit[LAST] - limit[SHIFT]:
             return True
     return False
 
@@ -270,21 +281,21 @@ def find_bounds(work, n):
         else:
             bounds.lower[j] = limit[SHIFT] - limit[COMMAND]
     for i in range(work.limit.shape[0]):
-        # Who must stop at once may do so, whatever the speed limit behind it would say.
+        # Who must stop at once may do so, whatever the speed limit behind it would say, and what a joint
+        # does more towards one limit in the middle of the tick it does less towards the other.
         limit, j = work.limit[i], work.limit_joint[i]
         apart = bounds.lower[j] - bounds.upper[j]
         if apart > 0.0 and limit[SIGN] > 0.0:
-            bounds.lower[j] -= min(limit[HASTE], apart)
+            bounds.lower[j] -= min(limit[HASTE] + limit[SHIFT], apart)
         elif apart > 0.0:
-            bounds.upper[j] += min(limit[HASTE], apart)
+            bounds.upper[j] += min(limit[HASTE] + limit[SHIFT], apart)
 
 
 @jit
-def look_ahead(work, n):
-    """Take off what joints do more towards their limits in the middle of the tick, up to the margin.
+def _evaluate_middle(work, n):
+    """Find by how much accelerations differ in the middle of the tick, while the torque stays.
 
-    Constant torque does not give constant acceleration. Reads joint_acceleration (n,) and tau (n,),
-    writes later and the column SHIFT of limit.
+    Reads joint_acceleration (n,), rad/s², and tau (n,), N·m; writes later and change (n,), rad/s².
 
     Returns:
         Whether that can be computed here.
@@ -302,7 +313,34 @@ def look_ahead(work, n):
         change[a] = work.tau[a] - work.reaction[a] - work.later.bias[a] + work.torque_middle[a]
     whiten(work.later_inertia, change)
     acceleration_of(work.later_inertia, change)
+    for a in range(n):
+        change[a] -= x[a]
+    return True
+
+
+@jit
+def _more(work, i):
+    """What a joint does more towards a limit in the middle of the tick, rad/s²."""
+    return max(work.limit[i, SIGN] * work.change[work.limit_joint[i]], 0.0)
+
+
+@jit
+def _same_as_taken_off(work):
+    """Whether what joints do more in the middle of the tick is what bounds count with."""
+    for i in range(work.limit.shape[0]):
+        more = _more(work, i)
+        if abs(more - work.limit[i, SHIFT]) > SEEN * max(1.0, more):
+            return False
+    return True
+
+
+@jit
+def _passes_in_the_middle(work):
+    """Whether a joint does more than it may, counted with the middle of the tick."""
     for i in range(work.limit.shape[0]):
         limit, j = work.limit[i], work.limit_joint[i]
-        limit[SHIFT] = min(max(limit[SIGN] * (change[j] - x[j]), 0.0), limit[MARGIN])
-    return True
+        most = limit[COMMAND]
+        towards = limit[SIGN] * (work.joint_acceleration[j] + work.change[j])
+        if towards - most > LOST * max(1.0, abs(most)):
+            return True
+    return False

@@ -574,6 +574,10 @@ BROKEN = 1e-9
 """A bound is broken by more than this part of itself, or by more than this."""
 LOST = 1e-3
 """A bound that is still broken by more than this part of itself, or by more than this, is lost."""
+LOOKS = 6
+"""How often the middle of a tick is looked at, at most."""
+SEEN = 1e-4
+"""What joints do more in the middle of a tick is known to this part of itself, or to this, rad/s²."""
 
 
 NO_DISTANCE = 1e-3
