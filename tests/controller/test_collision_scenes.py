@@ -14,9 +14,9 @@ pytestmark = pytest.mark.slow
 STEPS = {
     "table": (0.5, 0.3),
     "self_fold": (0.5, 0.3),
-    "moving_ball": (0.8, 0.3),
-    "gap": (0.9, 0.5),
-    "clutter": (3.0, 0.8),
+    "moving_ball": (0.5, 0.3),
+    "gap": (0.5, 0.3),
+    "clutter": (3.0, 0.6),
 }
 
 

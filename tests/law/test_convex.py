@@ -4,7 +4,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from opspace.law.convex import Bodies, Points, box_distance, distance_rows
-from opspace.law.scalars import ROUNDED, allowed_speed, closing_command
+from opspace.law.scalars import ROUNDED, allowed_speed, closing_command, last_closing_command
+from opspace.tasks import CollisionAvoidance
 
 coal = pytest.importorskip("coal")
 KINDS = ("ball", "capsule", "box", "half-space")
@@ -151,19 +152,37 @@ def test_on_the_axis_of_a_capsule_there_is_still_a_direction():
     assert np.linalg.norm(normal[0]) == 1.0
 
 
+BRAKE, K1, K2 = 4.0, CollisionAvoidance.k1, CollisionAvoidance.k2
 SPEEDS = st.floats(0.0, 1.0)
 
 
 @given(d=st.floats(0.0, 2.0), share=st.floats(0.05, 0.95), theirs=SPEEDS)
 def test_who_stands_need_not_give_way_to_one_that_keeps_to_its_share(d, share, theirs):
-    allowed, _ = allowed_speed(d, 4.0, 10.0)
+    allowed, _ = allowed_speed(d, BRAKE, K1)
     towards = theirs * (1.0 - share) * allowed
-    assert closing_command(d, towards, 0.0, share, 4.0, 10.0, 20.0) >= -1e-12
+    assert closing_command(d, towards, 0.0, share, BRAKE, K1, K2) >= -1e-12
 
 
 @given(d=st.floats(0.0, 2.0), share=st.floats(0.05, 0.95), mine=SPEEDS, theirs=SPEEDS)
 def test_two_that_share_close_no_faster_than_one_alone_would(d, share, mine, theirs):
-    allowed, _ = allowed_speed(d, 4.0, 10.0)
+    allowed, _ = allowed_speed(d, BRAKE, K1)
     one, two = mine * share * allowed, theirs * (1.0 - share) * allowed
-    command = lambda own, part: closing_command(d, one + two, own, part, 4.0, 10.0, 20.0)  # noqa: E731
+    command = lambda own, part: closing_command(d, one + two, own, part, BRAKE, K1, K2)  # noqa: E731
     assert command(one, share) + command(two, 1.0 - share) <= command(one + two, 1.0) + 1e-9
+
+
+@given(d=st.floats(0.0, 2.0), part=SPEEDS, period=st.floats(1e-4, 0.015))
+def test_a_distance_that_is_not_lost_goes_on_closing_no_faster_than_it_may(d, part, period):
+    towards = part * allowed_speed(d, BRAKE, K1)[0]
+    command = closing_command(d, towards, towards, 1.0, BRAKE, K1, K2)
+    last = last_closing_command(d, towards, towards, 1.0, BRAKE, K1, command)
+    assert last >= command - 1e-12 * abs(command)
+    later = towards + last * period
+    assert later <= allowed_speed(d - later * period, BRAKE, K1)[0] + 1e-9
+
+
+@given(d=st.floats(-0.1, 2.0), more=st.floats(0.0, 1.0))
+def test_what_closes_too_fast_is_lost_where_it_does_not_slow_down(d, more):
+    towards = allowed_speed(d, BRAKE, K1)[0] + more
+    command = closing_command(d, towards, towards, 1.0, BRAKE, K1, K2)
+    assert last_closing_command(d, towards, towards, 1.0, BRAKE, K1, command) == command

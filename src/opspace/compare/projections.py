@@ -232,4 +232,4 @@ def _distances(
     D, rate = np.array(tick.distance) - guard.margin, np.einsum("ki,ki->k", n, v)
     share = d.share[sets]
     own = np.where(share > 0.0, np.einsum("ki,ki->k", n, ball[:, 3:6]), rate)
-    return D, rate, np.array(d.most) - closing(guard, D, rate, own, share)
+    return D, rate, np.array(d.most) - closing(guard, D, rate, own, share)[0]

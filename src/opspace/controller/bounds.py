@@ -100,6 +100,12 @@ class Bounds:
             return -np.inf
         return excess_of_rows(acceleration, self.distances.G, self.distances.most)
 
+    def will_close(self, acceleration: np.ndarray) -> bool:
+        """Tell whether a distance will soon shrink faster than it may."""
+        if self.distances is None:
+            return False
+        return excess_of_rows(acceleration, self.distances.G, self.distances.last) > LOST
+
 
 NOTHING = np.zeros(0)
 
@@ -162,7 +168,7 @@ def realise(bounds: Bounds, tau: np.ndarray, metric: Callable[[], np.ndarray]) -
         status |= Status.LIMIT_LOST
     if np.any(found.rows > 0.0):
         status |= Status.COLLISION
-    if bounds.approach(found.acceleration) > LOST:
+    if bounds.will_close(found.acceleration):
         status |= Status.COLLISION_LOST
     limits = acting(bounds.terms, found.upper, found.lower)
     return Kept(tau, status, limits, found.rows)

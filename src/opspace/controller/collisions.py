@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from opspace.law.convex import Bodies, DistanceRows, Points, distance_rows
-from opspace.law.scalars import closing_command
+from opspace.law.scalars import closing_command, last_closing_command
 from opspace.robots.protocol import Robot
 from opspace.tasks.collision_avoidance import CollisionAvoidance
 from opspace.tasks.distance_layout import DistanceLayout
@@ -24,6 +24,7 @@ class DistanceTerms(NamedTuple):
         distance: (rows,) between the shapes, m.
         G: (rows, n) by how much joint accelerations let each shrink faster.
         most: (rows,) m/s².
+        last: (rows,) m/s² before one will soon shrink faster than it may.
     """
 
     layout: DistanceLayout
@@ -31,6 +32,7 @@ class DistanceTerms(NamedTuple):
     distance: np.ndarray
     G: np.ndarray
     most: np.ndarray
+    last: np.ndarray
 
     @property
     def by_name(self) -> Mapping[str, Placing]:
@@ -45,31 +47,36 @@ def distance_terms(guard: CollisionAvoidance, robot: Robot, t: float) -> Distanc
     rows = rows_of(layout, robot, placings)
     balls, sets = layout.rows[:, 0], layout.rows[:, 1]
     distance = rows.distance - layout.ball_radius[balls] - layout.set_radius[sets]
-    most = _most(guard, distance - guard.margin, rows, layout.share[sets])
-    return DistanceTerms(layout, placings, distance, -rows.G, most)
+    most, last = _commands(guard, distance - guard.margin, rows, layout.share[sets])
+    return DistanceTerms(layout, placings, distance, -rows.G, most, last)
 
 
-def _most(
+def _commands(
     guard: CollisionAvoidance, D: np.ndarray, rows: DistanceRows, share: np.ndarray
-) -> np.ndarray:
-    """Say how fast each distance may shrink faster, (rows,) m/s²."""
+) -> tuple[np.ndarray, np.ndarray]:
+    """Say how fast each distance may shrink faster, and before it is lost, (rows,) m/s²."""
     shared = share > 0.0
     own = np.where(shared, rows.own_rate, rows.rate)
     drift = np.where(shared, rows.own_drift, rows.drift)
-    return closing(guard, D, rows.rate, own, share) + drift
+    most, last = closing(guard, D, rows.rate, own, share)
+    return most + drift, last + drift
 
 
 def closing(
     guard: CollisionAvoidance, D: np.ndarray, rate: np.ndarray, own: np.ndarray, share: np.ndarray
 ) -> np.ndarray:
-    """Evaluate `opspace.law.scalars.closing_command` for every row, (rows,) m/s²; share 0 is alone."""
+    """Evaluate both closing commands of `opspace.law.scalars` for every row, m/s²; share 0 is alone.
+
+    Returns:
+        (2, rows) `closing_command` and `last_closing_command`.
+    """
+    found = np.zeros((2, D.size))
     told = zip(D.tolist(), rate.tolist(), own.tolist(), share.tolist(), strict=True)
-    return np.array(
-        [
-            closing_command(d, -speed, -part, s or 1.0, guard.brake, guard.k1, guard.k2)
-            for d, speed, part, s in told
-        ]
-    )
+    for i, (d, speed, part, s) in enumerate(told):
+        at = (d, -speed, -part, s or 1.0, guard.brake, guard.k1)
+        found[0, i] = closing_command(*at, guard.k2)
+        found[1, i] = last_closing_command(*at, found[0, i])
+    return found
 
 
 def rows_of(layout: DistanceLayout, robot: Robot, placings: Sequence[Placing]) -> DistanceRows:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 
-from opspace.kernels.compiled_scalars import closing_command
+from opspace.kernels.compiled_scalars import closing_command, last_closing_command
 from opspace.kernels.motion import cross_add, move_joints
-from opspace.law.scalars import NO_DISTANCE, ROUNDED
+from opspace.law.scalars import LOST, NO_DISTANCE, ROUNDED
 from opspace.machine.jit import jit
 
 MARGIN, K1, K2, BRAKE = range(4)
@@ -107,7 +107,9 @@ def _bound(work, d, i, ball, of):
         drift += curved
     D = work.distance[i] - d.limits[MARGIN]
     brake, k1, k2 = d.limits[BRAKE], d.limits[K1], d.limits[K2]
-    d.most[i] = drift + closing_command(D, -rate, -own, share, brake, k1, k2)
+    command = closing_command(D, -rate, -own, share, brake, k1, k2)
+    d.most[i] = drift + command
+    d.last[i] = drift + last_closing_command(D, -rate, -own, share, brake, k1, command)
     _row(work, d, i, of, nx, ny, nz)
 
 
@@ -186,6 +188,16 @@ def approach(work):
     for i in range(d.most.shape[0]):
         most = max(most, (faster(d, i, x) - d.most[i]) / max(1.0, abs(d.most[i])))
     return most
+
+
+@jit
+def will_close(work):
+    """Whether a distance shrinks so much faster that it will soon close faster than it may."""
+    d, x = work.distances, work.joint_acceleration
+    for i in range(d.last.shape[0]):
+        if faster(d, i, x) - d.last[i] > LOST * max(1.0, abs(d.last[i])):
+            return True
+    return False
 
 
 @jit

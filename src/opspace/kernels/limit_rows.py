@@ -22,7 +22,7 @@ from opspace.kernels.compiled_scalars import (
     limit_presence,
     stopping_command,
 )
-from opspace.kernels.distances import approach
+from opspace.kernels.distances import approach, will_close
 from opspace.kernels.dynamics import evaluate
 from opspace.kernels.inertia import acceleration_of, factor, whiten
 from opspace.kernels.limit_columns import (
@@ -222,7 +222,7 @@ def _acting(work, n):
         work.distance_taken[i] = taken[4 * n + i]
         if taken[4 * n + i] > 0.0:
             bits |= COLLISION
-    if approach(work) > LOST:
+    if will_close(work):
         bits |= COLLISION_LOST
     if find_excess(work, n) > LOST or will_pass(work):
         bits |= LIMIT_LOST

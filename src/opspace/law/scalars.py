@@ -250,6 +250,9 @@ class LimitLaw(NamedTuple):
 EASE = 1.5
 """What is left of an admissible speed where distances may already change twice as fast, m/s."""
 
+SOON = 0.02
+"""A distance is lost that would be closing faster than it may within this time, s."""
+
 ROUNDED = 0.3
 """Part of a direction along an axis of a box from which on the edge there counts as round."""
 
@@ -280,7 +283,7 @@ def closing_command(
 ) -> float:
     """Evaluate how fast two bodies at distance d that close at speed ``towards`` may close faster.
 
-        v̇ ≤ −s v v_adm'(d) + k₂ e (1 + (e/`EASE`)⁴),   e = s v_adm(d) − v_own
+        v̇ ≤ −s v v_adm'(d) + e min(k₂ (1 + (e/`EASE`)⁴), 1/`SOON`),   e = s v_adm(d) − v_own
 
     The power, where e is above zero, lets what is far and slow change as it likes. Of two that avoid
     each other one has the share s and moves at v_own towards the other; alone s is 1, v_own is v.
@@ -288,7 +291,21 @@ def closing_command(
     allowed, slope = allowed_speed(d, brake, k1)
     left = share * allowed - own
     ease = max(left, 0.0) / EASE
-    return k2 * left * (1.0 + ease**4) - share * towards * slope
+    return left * min(k2 * (1.0 + ease**4), 1.0 / SOON) - share * towards * slope
+
+
+def last_closing_command(
+    d: float, towards: float, own: float, share: float, brake: float, k1: float, command: float
+) -> float:
+    """Evaluate how fast two bodies that are told ``command`` may close faster before a speed is lost.
+
+        v̇ ≤ −s v v_adm'(d) + e/`SOON`   for e > 0, see `closing_command`
+
+    With less than that e stays positive from tick to tick, whatever is asked of it.
+    """
+    allowed, slope = allowed_speed(d, brake, k1)
+    left = share * allowed - own
+    return left / SOON - share * towards * slope if left > 0.0 else command
 
 
 def stopping_command(

@@ -30,5 +30,6 @@ DISTANCES = RecordTable(
     Field("set_motion", ("sets", 12), "motion at the origin of the world, and its rate"),
     Field("G", ("distances", "n"), "by how much accelerations let each shrink faster"),
     Field("most", ("distances",), "how fast that may be", "m/s²"),
+    Field("last", ("distances",), "how fast before it closes faster than it may", "m/s²"),
     Field("held", ("distances",), "whether the projection has taken it in", dtype=_INT),
 )

@@ -67,8 +67,8 @@ class CollisionAvoidance:
         UnknownNameError: An unknown choice; at binding a frame that the robot does not have.
     """
 
-    k1 = 10.0
-    k2 = 20.0
+    k1 = 8.0
+    k2 = 12.0
 
     def __init__(
         self,
