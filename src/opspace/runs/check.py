@@ -11,12 +11,13 @@ import numpy as np
 
 from opspace.controller import Controller
 from opspace.errors import InputError
-from opspace.plan.calibration import BRAKE_RANGE, Calibration, sample_postures
+from opspace.plan.calibration import BRAKE_RANGE, Calibration
 from opspace.plan.scales import Singularity
 from opspace.robots.adapter import AdapterBase, held_joints
 from opspace.robots.joint_units import joint_units
 from opspace.robots.motor_range import motor_range
 from opspace.robots.protocol import Robot
+from opspace.robots.sampled_postures import sample_postures
 from opspace.stack import Stack
 from opspace.tasks import OrientationTask, PositionTask, Task
 
