@@ -200,7 +200,7 @@ CASES = {
 }  # fmt: skip
 
 
-def off_after(robot: AdapterBase, seconds: float = 0.5) -> float:
+def off_after(robot: AdapterBase, seconds: float = 2.0) -> float:
     """Hold the reference posture in the simulator and return how far the tool went, m."""
     plant = osc.Plant(robot, robot.q_reference)
     start = robot.position(robot.tool).copy()
@@ -287,7 +287,7 @@ def test_the_whole_file_holds_still_in_a_loop_of_ones_own(tmp_path: Path, what: 
     data.qpos[places] = robot.q_reference
     start = robot.position(robot.tool).copy()
     controller = osc.Controller(robot, osc.Stack([osc.PostureTask(robot.q_reference)]))
-    for _ in range(500):
+    for _ in range(2000):
         tau = controller.step(data.time, data.qpos[places], data.qvel[dofs]).tau
         data.qfrc_applied[dofs] = tau
         mujoco.mj_step(model, data)
@@ -329,7 +329,7 @@ def test_every_robot_of_example_robot_data(path: Path) -> None:
         report = check_robot(robot)
     except OpspaceError as refused:
         words = str(refused)
-        assert path.name in words or "moves no mass of its own" in words  # noqa: PT017 - either way
+        assert path.name in words or "moves no mass of its own" in words
         assert path.stem in REFUSED, words
         return
     assert path.stem not in REFUSED
@@ -341,6 +341,5 @@ def test_every_robot_of_example_robot_data(path: Path) -> None:
     weak = any("torque is above the limit" in sentence for sentence in report.warnings)
     robot.update(plant.q, plant.v)
     assert weak or np.abs(robot.position(robot.tool) - start).max() < 1e-3
-    assert not any("singularity" in sentence and OTHERS in sentence for sentence in report.warnings)
     with pytest.raises(OpspaceError, match=r"not fully actuated|cannot float|lock them"):
         osc.Controller(load_robot(path, floating_base=True), osc.Stack([osc.PostureTask()]))
