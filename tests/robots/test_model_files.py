@@ -341,5 +341,3 @@ def test_every_robot_of_example_robot_data(path: Path) -> None:
     weak = any("torque is above the limit" in sentence for sentence in report.warnings)
     robot.update(plant.q, plant.v)
     assert weak or np.abs(robot.position(robot.tool) - start).max() < 1e-3
-    with pytest.raises(OpspaceError, match=r"not fully actuated|cannot float|lock them"):
-        osc.Controller(load_robot(path, floating_base=True), osc.Stack([osc.PostureTask()]))

@@ -57,6 +57,8 @@ class Workspace:
         self._visited: list[tuple[np.ndarray, np.ndarray]] = []
         brake = np.full(robot.nv, np.inf)
         joint_sigma, motors = np.inf, motor_range(robot)
+        robot.update(robot.q_reference, np.zeros(robot.nv))
+        _checked_inertia(robot)
         for q in sample_postures(robot):
             robot.update(q, np.zeros(robot.nv))
             inverse = np.linalg.inv(_checked_inertia(robot))
