@@ -117,6 +117,12 @@ def test_sites_that_angles_turn_carry_it_where_they_are(tmp_path: Path) -> None:
     np.testing.assert_allclose((plant.v - v) / 1e-6, expected, rtol=1e-4)
 
 
+def test_quaternions_with_three_decimals_are_made_exact() -> None:
+    robot = build_robot(told(frames={"seen": {"placement": [0, 0, 0, 0.707, 0, 0.707, 0]}}))
+    R = robot.rotation(robot.frame_id("seen"))
+    np.testing.assert_allclose(R @ R.T, np.eye(3), atol=1e-14)
+
+
 def test_a_plant_keeps_what_it_was_made_with() -> None:
     robot = load_robot("panda")
     robot.payload = Payload(1.0)

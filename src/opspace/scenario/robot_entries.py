@@ -2,24 +2,26 @@
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, Any
 
-import numpy as np
 from pydantic import Field
 
 from opspace.robots.payload import Payload
 from opspace.scenario.fields import Checked, Entry, Number, problem, shown
+from opspace.scenario.targets import QUATERNION_TOLERANCE
 
 
 def _placement(value: Any) -> tuple[float, ...]:
-    """Read a position, or a position and a quaternion."""
-    if isinstance(value, list | tuple) and len(value) in (3, 7):
-        found = Number("1", size="any").check(value)
-        assert isinstance(found, tuple)
-        if len(found) == 7 and abs(np.linalg.norm(found[3:]) - 1.0) > 1e-3:
-            raise problem(f"must end with a quaternion w x y z of norm 1, not {shown(value[3:])}")
-        return found
-    raise problem(f"must be [x, y, z] or [x, y, z, qw, qx, qy, qz] [m], not {shown(value)}")
+    """Read a position, or a position and a quaternion, which is made exact."""
+    if not isinstance(value, list | tuple) or len(value) not in (3, 7):
+        raise problem(f"must be [x, y, z] or [x, y, z, qw, qx, qy, qz] [m], not {shown(value)}")
+    found = Number("1", size="any").check(value)
+    assert isinstance(found, tuple)
+    norm = math.hypot(*found[3:])
+    if len(found) == 7 and abs(norm - 1.0) > QUATERNION_TOLERANCE:
+        raise problem(f"must end with a quaternion w x y z of norm 1, not {norm:.6g}")
+    return (*found[:3], *(number / norm for number in found[3:]))
 
 
 def _inertia(value: Any) -> tuple[Any, ...] | None:
