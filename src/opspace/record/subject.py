@@ -84,7 +84,7 @@ def _robot(controller: ReferenceController) -> dict[str, Any]:
 
 
 def _has_name(robot: Robot) -> bool:
-    """Whether loading it by its name gives this robot; files may be called so and be loaded otherwise."""
+    """Whether loading it by name gives this robot; a file of this name may be loaded otherwise."""
     entry = CATALOGUE.get(robot.name)
     return (
         entry is not None
