@@ -47,6 +47,11 @@ CASES = {
     "gripper with a tool centre point": (
         "zyyzyz", (GRIP, TWO_FINGERS, fixed("grip_base", "tcp")), "tcp",
     ),
+    "stiff fingers beside an end effector": (
+        "zyyzyz",
+        (fixed("l6", "finger") + fixed("finger", "finger_tip") + fixed("l6", "arm_end_effector"),),
+        "arm_end_effector",
+    ),
     "five fingers of three joints": ("zyyzyz", (GRIP, FIVE_FINGERS, CAMERA), "grip_base"),
     "arms on a trunk": ("zy", (ARMS_ON_A_TRUNK,), "left6"),
 }  # fmt: skip

@@ -8,6 +8,14 @@ from collections.abc import Collection, Iterable
 SENSOR = re.compile(r"camera|optical|(^|_)imu(_|$)|lidar", re.IGNORECASE)
 """How people call frames of what looks or feels from an arm."""
 
+TOOL = re.compile(r"(^|_)(tool\d*|tcp|end_effector|ee)(_|$)", re.IGNORECASE)
+"""How people call the frame that they lead."""
+
+
+def is_called_tool(frame: str) -> bool:
+    """Tell whether a file calls a frame a tool."""
+    return TOOL.search(frame) is not None
+
 
 def senses(frame: str) -> bool:
     """Tell whether a frame is that of a sensor by its name; nobody means one by a tool."""

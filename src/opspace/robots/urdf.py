@@ -27,7 +27,7 @@ from opspace.robots.joint_roles import (
     assign_roles,
 )
 from opspace.robots.link_inertia import MOMENTS, inertia_warnings
-from opspace.robots.tool_choice import hand_of, senses
+from opspace.robots.tool_choice import hand_of, is_called_tool, senses
 from opspace.robots.urdf_pose import held_at
 
 VECTORS = {"xyz", "rpy"}
@@ -376,8 +376,8 @@ def _tool(urdf: Urdf) -> str:
     """Return the last link of the longest chain, counted in controlled and then in all joints.
 
     Links behind a joint that is held, and those of a hand, are left out: a tool that other motors
-    move is no frame of the arm's own. So are sensors; and where a hand is fixed to what the chain
-    moves last, the tool is the link that carries its fingers, or what is fixed to that.
+    move is no frame of the arm's own. So are sensors. Of what the chain moves last, the tool is the
+    link that carries the fingers of a hand, or what is fixed to that; and one that is called a tool.
     """
     carrier, above = _above(urdf)
     soft = {name for c in urdf.roles.couplings for name in (c.follower, c.leader)}
@@ -396,7 +396,7 @@ def _tool(urdf: Urdf) -> str:
     last = carrier[max(own, key=lambda link: depth[link])]
     return max(
         (link for link in own if carrier[link] == last),
-        key=lambda link: (held[link], depth[link]),
+        key=lambda link: (held[link], is_called_tool(link), depth[link]),
     )
 
 
