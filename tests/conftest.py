@@ -4,6 +4,7 @@ from hypothesis import HealthCheck, settings
 from jaxtyping import install_import_hook
 
 from tests import shapes
+from tests.another_python import ask_for
 
 # The compiled form takes no annotations; it is tested against this one.
 READABLE = (
@@ -28,9 +29,9 @@ settings.load_profile("gate")
 
 def pytest_configure(config):
     """Have the kernels ready before any test, once for all workers, and keep single ones."""
-    del config
     from opspace.plan.entries import KERNELS
 
+    ask_for(config.getoption("pythonwarnings"))
     keep_single_kernels()
     KERNELS.load()
 

@@ -12,8 +12,8 @@ import numpy as np
 
 from opspace.command import Status
 from opspace.loop import StopRule, simulate
-from opspace.plan.calibration import sample_postures
 from opspace.plots.labels import number
+from opspace.robots.sampled_postures import sample_postures
 from opspace.scenario.build import build, build_robot
 from opspace.scenario.load import load_scenario
 from opspace.sim import Plant

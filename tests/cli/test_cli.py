@@ -46,7 +46,7 @@ def test_the_version_is_printed(capsys):
     ("words", "named"),
     [
         (["robts"], "'robts'. Did you mean 'robots'?"),
-        (["robots", "--jsn"], "--jsn (Possible options: --json)"),
+        (["robots", "--jsn"], "--json"),
         (["robots", "surplus"], "surplus"),
         (["--nothing"], "--nothing"),
     ],

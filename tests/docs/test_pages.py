@@ -5,12 +5,12 @@ import json
 import re
 import shlex
 import subprocess
-import sys
 from importlib import metadata
 from pathlib import Path
 
 import pytest
 import typer
+from tests.another_python import python
 from tests.docs.pages import (
     DOCS,
     PAGES,
@@ -60,7 +60,7 @@ def is_example(block):
 
 def run_blocks(blocks, folder):
     return subprocess.run(
-        [sys.executable, "-W", "error", "-c", RUNNER],
+        python("-c", RUNNER),
         input=json.dumps(blocks),
         capture_output=True,
         encoding="utf-8",

@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from tests.another_python import python
 
 EVIDENCE = Path(__file__).parents[2] / "docs" / "evidence"
 SURE = (
@@ -35,7 +36,7 @@ def run_again(robot, experiment, variants):
         "\nprint(json.dumps(rows))"
     )
     done = subprocess.run(
-        [sys.executable, "-W", "error", "-c", program],
+        python("-c", program),
         capture_output=True,
         encoding="utf-8",
         check=True,

@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from tests.another_python import python
 
 DOCS = Path(__file__).parents[2] / "docs"
 EVIDENCE = DOCS / "evidence"
@@ -33,7 +34,7 @@ def run_again(expression):
         f"print(json.dumps({expression}))"
     )
     done = subprocess.run(
-        [sys.executable, "-W", "error", "-c", program],
+        python("-c", program),
         capture_output=True,
         encoding="utf-8",
         check=True,

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.another_python import python
 
 DOCS = Path(__file__).parents[2] / "docs"
 EVIDENCE = DOCS / "evidence"
@@ -55,7 +56,7 @@ def test_named_functions_are_where_the_links_say(name, module):
 
 def test_the_measured_numbers_are_those_of_the_script():
     # As a reader would run it; in this process, shape checks would make it five times slower.
-    script = [sys.executable, "-W", "error", str(EVIDENCE / "measure.py")]
+    script = python(str(EVIDENCE / "measure.py"))
     environment = {**os.environ, "PYTHONIOENCODING": "utf-8"}
     output = subprocess.run(
         script, capture_output=True, encoding="utf-8", check=True, env=environment

@@ -4,10 +4,10 @@ import os
 import re
 import shutil
 import subprocess
-import sys
 from pathlib import Path
 
 import pytest
+from tests.another_python import python
 
 import opspace
 
@@ -70,7 +70,7 @@ def patched(tmp_path):
 
 def use(patched, program):
     environment = {**os.environ, "PYTHONPATH": str(patched / "src")}
-    subprocess.run([sys.executable, "-W", "error", "-c", program], env=environment, check=True)
+    subprocess.run(python("-c", program), env=environment, check=True)
 
 
 def test_what_the_patches_add_works(patched):

@@ -1,10 +1,10 @@
 """Every example runs as a user would run it, says something, and is short."""
 
 import subprocess
-import sys
 from pathlib import Path
 
 import pytest
+from tests.another_python import python
 
 EXAMPLES = sorted((Path(__file__).parents[2] / "examples").glob("*.py"))
 
@@ -18,7 +18,7 @@ def test_an_example_runs(path):
         extra, package = EXTRAS[path.stem]
         pytest.importorskip(package, reason=f"{path.name} needs pip install 'opspace[{extra}]'")
     done = subprocess.run(
-        [sys.executable, "-W", "error", str(path)],
+        python(str(path)),
         capture_output=True,
         encoding="utf-8",
         check=False,

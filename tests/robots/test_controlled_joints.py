@@ -272,7 +272,7 @@ def test_followers_keep_within_their_own_limits(tmp_path: Path) -> None:
     np.testing.assert_allclose([robot.q_lower[k], robot.q_upper[k]], [-0.45, 0.55])
     assert robot.velocity_limit[k] == 0.75
     far = '<mimic joint="f1" multiplier="0.1" offset="5"/>'
-    with pytest.raises(ModelError, match="no position of joint 'f1' keeps the joints that follow"):
+    with pytest.raises(ModelError, match="no position of joint 'f1' keeps f2, which follow"):
         load_robot(arm_with_fingers(tmp_path / "r.urdf", "", far))
 
 

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from opspace.robots import Robot, load_robot
+from opspace.robots.link_inertia import inertia_of
 from opspace.robots.urdf import read_urdf
-from opspace.robots.urdf_export import inertia
 from tests.robots.samples import BACKENDS, NAMES, random_state
 
 # Its motors are not alike in both directions, see tests/robots/test_motors.py.
@@ -103,7 +103,7 @@ def test_free_motion_keeps_its_energy(robot: Robot, files: dict[str, Path]) -> N
 def test_gravity_is_the_slope_of_the_potential(files: dict[str, Path], backend: str) -> None:
     robot = load_robot(files["oddity"], backend=backend)
     urdf = read_urdf(files["oddity"])
-    mass = sum(inertia(urdf, link)[0] for link in urdf.links if link != urdf.root)
+    mass = sum(inertia_of(urdf.links[link])[0] for link in urdf.links if link != urdf.root)
     q, _ = random_state(robot, np.random.default_rng(9))
     down = np.array([0.0, 0.0, -9.81])
     for j, e in enumerate(np.eye(robot.nv)):
@@ -127,7 +127,7 @@ def test_inertia_is_the_sum_over_the_links(name: str, backend: str) -> None:
     robot.update(*random_state(robot, np.random.default_rng(11)))
     total = np.diag(np.where(robot.actuated, robot.description.armature, 0.0))
     for link in urdf.links:
-        mass, center, tensor = inertia(urdf, link)
+        mass, center, tensor = inertia_of(urdf.links[link])
         frame = robot.frame_id(link)
         J, R = robot.jacobian(frame), robot.rotation(frame)
         linear = J[:3] - np.cross(R @ center, J[3:], axisa=0, axisb=0, axisc=0)

@@ -200,7 +200,7 @@ CASES = {
 }  # fmt: skip
 
 
-def off_after(robot: AdapterBase, seconds: float = 0.5) -> float:
+def off_after(robot: AdapterBase, seconds: float = 2.0) -> float:
     """Hold the reference posture in the simulator and return how far the tool went, m."""
     plant = osc.Plant(robot, robot.q_reference)
     start = robot.position(robot.tool).copy()
@@ -287,7 +287,7 @@ def test_the_whole_file_holds_still_in_a_loop_of_ones_own(tmp_path: Path, what: 
     data.qpos[places] = robot.q_reference
     start = robot.position(robot.tool).copy()
     controller = osc.Controller(robot, osc.Stack([osc.PostureTask(robot.q_reference)]))
-    for _ in range(500):
+    for _ in range(2000):
         tau = controller.step(data.time, data.qpos[places], data.qvel[dofs]).tau
         data.qfrc_applied[dofs] = tau
         mujoco.mj_step(model, data)
@@ -306,6 +306,19 @@ def files_of_others() -> list[Path]:
     return sorted(root.rglob("*.urdf"))
 
 
+REFUSED = {
+    "alex_psyonic_hands",  # a joint mimics one that is not there
+    "quadrotor_base",  # nothing moves
+    "iris_simple",
+    "pr2",  # a joint follows another one that may only go where it may not
+    "romeo",  # hands of links without mass
+    "romeo_laas_small",
+    "icub",  # three axes of a neck about one point of mass
+    "ur3",  # no link at all
+}
+"""Files of which nothing can be made as they are."""
+
+
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::opspace.ModelWarning")
 @pytest.mark.parametrize("path", files_of_others(), ids=lambda path: path.stem)
@@ -314,17 +327,17 @@ def test_every_robot_of_example_robot_data(path: Path) -> None:
     try:
         robot = load_robot(path)
         report = check_robot(robot)
-        plant = osc.Plant(robot, robot.q_reference)
     except OpspaceError as refused:
-        assert path.name in str(refused) or "moves no mass" in str(refused)  # noqa: PT017 - either way
+        words = str(refused)
+        assert path.name in words or "moves no mass of its own" in words
+        assert path.stem in REFUSED, words
         return
+    assert path.stem not in REFUSED
+    plant = osc.Plant(robot, robot.q_reference)
+    robot.update(robot.q_reference, np.zeros(robot.nv))
     start = robot.position(robot.tool).copy()
     controller = osc.Controller(robot, osc.Stack([osc.PostureTask(robot.q_reference)]))
-    osc.simulate(plant, controller, 0.2)
+    osc.simulate(plant, controller, 2.0)
+    weak = any("torque is above the limit" in sentence for sentence in report.warnings)
     robot.update(plant.q, plant.v)
-    weak = np.any(np.abs(robot.gravity) > robot.torque_limit)
     assert weak or np.abs(robot.position(robot.tool) - start).max() < 1e-3
-    if weak:
-        assert any("torque is above the limit" in sentence for sentence in report.warnings)
-    with pytest.raises(OpspaceError, match=r"not fully actuated|cannot float|lock them"):
-        osc.Controller(load_robot(path, floating_base=True), osc.Stack([osc.PostureTask()]))

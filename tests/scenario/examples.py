@@ -9,7 +9,12 @@ backend: mujoco
 floating_base: false
 joints: ["joint?"]
 locked: {}
-tool: tool
+tool: camera
+reference: {joint2: 0.4}
+frames:
+  grip: {placement: [0, 0, 0.1, 1, 0, 0, 0]}
+  camera: {parent: grip, placement: [0.05, 0, 0]}
+payload: {mass: 0.4, centre: [0, 0, 0.02], inertia: [1e-3, 1e-3, 1e-3], frame: grip}
 duration: 1e1
 dt: 2e-3
 seed: 5

@@ -8,9 +8,11 @@ import pytest
 from opspace.controller import Controller
 from opspace.plan.scales import Singularity
 from opspace.robots import load_robot
+from opspace.robots.sampled_postures import sample_postures
 from opspace.runs.check import check_robot, to_plain
 from opspace.stack import Stack
 from opspace.tasks import PositionTask
+from tests.robots.serial_arms import serial_arm
 
 ARM = """<mujoco model="arm"><worldbody><body name="upper"><joint name="lift" axis="0 1 0"
  range="-90 90" {limit}/><geom size="0.05" mass="1" fromto="0 0 0 0.5 0 0" type="capsule"/>
@@ -69,3 +71,32 @@ def test_a_posture_that_cannot_be_held_is_reported(tmp_path, torque, weak):
     found = report(tmp_path, f'actuatorfrcrange="-{torque - 5} {torque - 5}"', q="0 0")
     assert np.isclose(abs(found.joints[0].gravity), 9.81, rtol=1e-3)
     assert warned(found, "cannot be held: its torque is above the limit of lift") == weak
+
+
+@pytest.mark.parametrize(
+    ("axes", "turns", "moves"),
+    [("xyy", 2, 3), ("yyy", 1, 2), ("zz", 1, 0), ("zyy", 2, 3), ("zyyzyz", 3, 3), ("y", 1, 0)],
+)
+@pytest.mark.parametrize("bend", [0.0, 0.7])
+def test_only_what_another_posture_has_is_called_singular(tmp_path, axes, turns, moves, bend):
+    path = serial_arm(tmp_path / "arm.urdf", axes)
+    robot = load_robot(path, reference=np.full(len(axes), bend))
+    found = check_robot(robot)
+    for name, rows, count in (
+        ("orientation", slice(3, 6), turns),
+        ("position", slice(0, 3), moves),
+    ):
+        missing = f"{3 - count} of 3 directions of the {name} cannot be moved at all"
+        assert warned(found, missing) == (count < 3)
+        if warned(found, f"near a singularity of the {name}"):
+            here, *others = (
+                weakest(robot, q, rows, count) for q in [robot.q_reference, *sample_postures(robot)]
+            )
+            assert max(others) > 1.1 * here
+
+
+def weakest(robot, q, rows, count):
+    """Return the last of the eigenvalues of J M⁻¹ Jᵀ that there are, strongest first."""
+    robot.update(q, np.zeros(robot.nv))
+    J = robot.jacobian(robot.tool)[rows]
+    return np.linalg.eigvalsh(J @ np.linalg.solve(robot.M, J.T))[3 - count]

@@ -16,7 +16,14 @@ from opspace.scenario.document import key_text, parse, to_yaml
 from tests.scenario.examples import EVERYTHING
 
 DATA = parse(EVERYTHING).data
-NAMED = {("tasks",), ("locked",), ("joint_limits", "joints"), ("collisions", "obstacles")}
+NAMED = {
+    ("tasks",),
+    ("locked",),
+    ("reference",),
+    ("frames",),
+    ("joint_limits", "joints"),
+    ("collisions", "obstacles"),
+}
 """Mappings whose keys are names of the user's."""
 
 
@@ -112,7 +119,7 @@ def test_only_finite_numbers_are_numbers(key):
 )
 def test_no_value_may_be_of_another_kind(key):
     """A mapping with an odd key stands for nothing that a scenario knows."""
-    error = refused(changed(key, {"odd": {}}))
+    error = refused(changed(key, {"odd": {"odd": {}}}))
     assert error.key.startswith(key_text(key[:-1]))
     assert error.line is not None
 
@@ -208,7 +215,7 @@ MISTAKES = [
     ),
     ("duration: 1e1", "duration: 3601", "duration", "above 0 and at most 3600 [s], not 3601"),
     ("duration: 1e1", "duration: 1e-3", "dt", "not be longer than the duration, 0.001 s"),
-    ("seed: 5", "seed: 5\nseed: 6", "seed", "given twice, first on line 10"),
+    ("seed: 5", "seed: 5\nseed: 6", "seed", "given twice, first on line 15"),
     ("  wrist:", "  rest:", "tasks.rest", "given twice"),
     ("robot: puma560", "robot: ' '", "robot", "name of a robot"),
     ("  max_torque: 500", "  max_torque: [", "", "YAML"),

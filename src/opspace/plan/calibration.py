@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
 from opspace.errors import ModelError
 from opspace.robots.motor_range import motor_range
-from opspace.robots.protocol import BASE, Robot
+from opspace.robots.protocol import Robot
+from opspace.robots.sampled_postures import sample_postures
 from opspace.tasks import Task
 from opspace.tasks.motion_task import MotionTask
 
-SAMPLES = 200
 UNKNOWN_BRAKE = 20.0
 """Braking acceleration where the torque limit is not known, rad/s²."""
 BRAKE_RANGE = (2.0, 50.0)
@@ -22,6 +21,8 @@ weight in some posture, the second a wrist that other joints could not follow.""
 
 STRUCTURAL = 1e-6
 """An eigenvalue below this fraction is zero in every posture: the arm has too few joints."""
+MASSLESS = 1e-12
+"""Part of the largest inertia in a joint below which another has none."""
 
 
 @dataclass(frozen=True)
@@ -56,6 +57,8 @@ class Workspace:
         self._visited: list[tuple[np.ndarray, np.ndarray]] = []
         brake = np.full(robot.nv, np.inf)
         joint_sigma, motors = np.inf, motor_range(robot)
+        robot.update(robot.q_reference, np.zeros(robot.nv))
+        _checked_inertia(robot)
         for q in sample_postures(robot):
             robot.update(q, np.zeros(robot.nv))
             inverse = np.linalg.inv(_checked_inertia(robot))
@@ -108,44 +111,35 @@ class Workspace:
 
 
 def _checked_inertia(robot: Robot) -> np.ndarray:
-    """The inertia, which every joint must have some of."""
+    """The inertia, which every joint must have some of that the ones before it do not move alike."""
     M = robot.M
+    if not np.all(np.isfinite(M)):
+        raise _no_inertia(robot, "check the masses")
     try:
-        if not np.all(np.isfinite(M)):
-            raise np.linalg.LinAlgError
-        np.linalg.cholesky(M)
+        own = np.linalg.cholesky(M).diagonal() ** 2
     except np.linalg.LinAlgError:
-        still = M.diagonal() <= 1e-12 * max(1e-300, float(np.nanmax(M.diagonal())))
+        own = _own_inertia(M)
+    still = own <= MASSLESS * max(float(M.diagonal().max()), 0.0)
+    if np.any(still):
         names = [joint for joint, s in zip(robot.joint_names, still, strict=True) if s]
-        which = (
-            f"joint {', '.join(map(repr, names))} moves no mass" if names else "check the masses"
+        raise _no_inertia(
+            robot,
+            f"joint {', '.join(map(repr, names))} moves no mass of its own: give the links a mass and "
+            "an inertia (<inertial> in a URDF), or hold the joint (locked=)",
         )
-        raise ModelError(
-            f"robot {robot.name!r}: its inertia is not positive definite; {which}"
-        ) from None
     return M
 
 
-def sample_postures(robot: Robot) -> Iterator[np.ndarray]:
-    """Visit postures uniformly distributed within the joint limits.
+def _own_inertia(M: np.ndarray) -> np.ndarray:
+    """Return what inertia each joint has while those before it are free to give way, (n,)."""
+    own = M.diagonal().copy()
+    for i in range(1, len(M)):
+        own[i] -= M[i, :i] @ np.linalg.lstsq(M[:i, :i], M[:i, i], rcond=MASSLESS)[0]
+    return own
 
-    Where there are none it is one turn of a hinge, and ±π m of a slide: how far one without an end
-    goes no model tells. What carries mass further out than that has less σ than any posture here.
 
-    Args:
-        robot: A robot whose joints have one coordinate each, its base fixed or floating.
-
-    Yields:
-        Configurations (nq,).
-    """
-    rng = np.random.default_rng(0)
-    lower = np.where(np.isfinite(robot.q_lower), robot.q_lower, -np.pi)
-    upper = np.where(np.isfinite(robot.q_upper), robot.q_upper, np.pi)
-    base = BASE if robot.floating_base else 0
-    for _ in range(SAMPLES):
-        joints = rng.uniform(lower, upper)
-        # Where a floating base is makes no difference to any scale.
-        yield np.concatenate([robot.q_reference[: base + 1], joints[base:]]) if base else joints
+def _no_inertia(robot: Robot, why: str) -> ModelError:
+    return ModelError(f"robot {robot.name!r}: its inertia is not positive definite; {why}")
 
 
 def _smallest_per_unit(task: Task, inverse_inertia: np.ndarray) -> np.ndarray:

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
+from matplotlib.figure import Figure, SubFigure
 from matplotlib.lines import Line2D
 from scipy.optimize import isotonic_regression
 
@@ -151,9 +151,11 @@ def key_row(figure: Figure, entries: Iterable[tuple[str, str]]) -> None:
 
 def _heights(panels: Sequence[Axes]) -> list[float]:
     """Lay their figure out and return the heights of panels in points."""
-    figure = panels[0].get_figure(root=True) if panels else None
-    if figure is None:
+    if not panels:
         return []
+    figure = panels[0].figure
+    while isinstance(figure, SubFigure):
+        figure = figure.figure
     figure.draw_without_rendering()
     return [p.get_window_extent().height * _POINTS_PER_INCH / figure.dpi for p in panels]
 

@@ -84,8 +84,14 @@ def _robot(controller: ReferenceController) -> dict[str, Any]:
 
 
 def _has_name(robot: Robot) -> bool:
+    """Whether loading it by name gives this robot; a file of this name may be loaded otherwise."""
     entry = CATALOGUE.get(robot.name)
-    return entry is not None and locate(entry) == robot.source
+    return (
+        entry is not None
+        and locate(entry) == robot.source
+        and robot.floating_base >= entry.floating_base
+        and set(entry.locked_joints) <= set(held_joints(robot))
+    )
 
 
 def _task(task: Task, level: float | None) -> dict[str, Any]:

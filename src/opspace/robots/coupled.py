@@ -163,9 +163,10 @@ def coupled_description(description: Description) -> Description:
             _narrow(limits, place[c.leader], at[c.follower], c.ratio, c.offset, description)
     for name, k in place.items():
         if limits["q_lower"][k] >= limits["q_upper"][k]:
+            following = [c.follower for c in description.couplings if c.leader == name]
             raise ModelError(
-                f"{description.source or description.name}: no position of joint {name!r} keeps the "
-                "joints that follow it within their limits; lock it"
+                f"{description.source or description.name}: no position of joint {name!r} keeps "
+                f"{', '.join(following)}, which follow it, within their limits; lock it"
             )
     q = np.clip(description.q_reference[leaders], limits["q_lower"], limits["q_upper"])
     names, uneven = description.joint_names, description.torque_range

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
 
@@ -201,32 +201,3 @@ def _matching(pattern: str, names: Sequence[str], file: str) -> list[str]:
 
 def _is_exact(joints: Collection[str] | None, name: str) -> bool:
     return joints is not None and name in joints
-
-
-def hand_of(moving: Iterable[tuple[str, str | None, str]], soft: Collection[str]) -> set[str]:
-    """Tell which joints belong to a hand, beyond which no tool is looked for.
-
-    Args:
-        moving: By joint its name, the controlled joint before it, and the rigid body that both
-            hang on.
-        soft: Joints that follow or lead others.
-
-    Returns:
-        The followers and their leaders that carry no joint of another kind, and the last joints
-        that two or more branches of one body end with, as fingers do.
-    """
-    joints = list(moving)
-    before = {name: parent for name, parent, _ in joints}
-    arm: set[str | None] = set()
-    for name, parent in before.items():
-        above = parent if name not in soft else None
-        while above is not None:
-            arm.add(above)
-            above = before[above]
-    ends: dict[str, list[str]] = {}
-    carrying = set(before.values())
-    for name, parent, body in joints:
-        if name not in carrying and parent is not None:
-            ends.setdefault(body, []).append(name)
-    fingers = {name for those in ends.values() if len(those) > 1 for name in those}
-    return fingers | {name for name in before if name in soft and name not in arm}

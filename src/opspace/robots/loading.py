@@ -93,9 +93,9 @@ def robot_of_urdf(
         pinocchio_model = model_from_urdf(urdf, floating_base)
         return _file(description, lambda d: PinocchioRobot(d, pinocchio_model))
     from opspace.robots.mujoco import MujocoRobot
-    from opspace.robots.mujoco_model import compile_spec, urdf_spec
+    from opspace.robots.mujoco_model import compile_urdf, urdf_spec
 
-    mujoco_model = compile_spec(urdf_spec(urdf, floating_base), urdf.origin)
+    mujoco_model = compile_urdf(urdf_spec(urdf, floating_base), urdf.origin)
     return _file(description, lambda d: MujocoRobot(d, mujoco_model))
 
 

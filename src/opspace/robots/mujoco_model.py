@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import xml.etree.ElementTree as ET
 from collections.abc import Callable, Collection, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
@@ -20,9 +21,9 @@ from opspace.robots.joint_roles import (
     JointChoice,
     JointRoles,
     assign_roles,
-    hand_of,
 )
 from opspace.robots.joint_units import effort_unit
+from opspace.robots.link_inertia import inertia_of, is_impossible
 from opspace.robots.mujoco_joints import equality_warnings, file_joints
 from opspace.robots.mujoco_meshes import drop_missing
 from opspace.robots.mujoco_motors import ON_JOINT, motor_warnings, read_motors
@@ -41,11 +42,12 @@ from opspace.robots.mujoco_reduce import couple, hold_joints
 from opspace.robots.mujoco_scene import add_scenery, add_skeleton
 from opspace.robots.passive_forces import force_warnings, read_springs
 from opspace.robots.protocol import Robot
+from opspace.robots.tool_choice import hand_of, senses
 from opspace.robots.urdf import Urdf, read_urdf
-from opspace.robots.urdf_export import inertia, to_xml
+from opspace.robots.urdf_export import to_xml
 
-# MuJoCo refuses a moving body without mass. A picogram adds less than rounding does.
-NEGLIGIBLE = 1e-12
+# MuJoCo refuses a moving body without mass or inertia. This adds less than rounding does, kg and kg·m².
+NEGLIGIBLE = 1e-14
 SLIDE, HINGE = 2, 3
 
 
@@ -103,15 +105,17 @@ def mujoco_model(
         spec = urdf_spec(urdf, floating_base)
         add_skeleton(spec)
         couple(spec, urdf.roles.couplings, {})
+        build = compile_urdf
     else:
         read = mjcf_spec(path, floating_base, JointChoice.of(None, locked_joints))
         spec = read.spec
         if read.roles.couplings:
             couple(spec, read.roles.couplings, _zero(compile_spec(spec, origin)))
+        build = compile_spec
     add_scenery(spec)
     if extend is not None:
         extend(spec)
-    model = compile_spec(spec, origin)
+    model = build(spec, origin)
     # Where actuators carry weight, MuJoCo counts it to them; the plant drives joints without any.
     model.jnt_actgravcomp[:] = 0
     return model
@@ -225,9 +229,9 @@ def urdf_spec(urdf: Urdf, floating_base: bool) -> mujoco.MjSpec:
         element.range = [joint.lower, joint.upper] if limited else [0.0, 0.0]
         element.actfrclimited = int(np.isfinite(joint.effort))
         element.actfrcrange = [-joint.effort, joint.effort] if element.actfrclimited else [0, 0]
-    for link in urdf.links:
+    for link, inertial in urdf.links.items():
         if link != WORLD:
-            _set_inertia(spec.body(link), urdf, link)
+            _set_inertia(spec.body(link), inertial)
     return spec
 
 
@@ -257,6 +261,30 @@ def compile_spec(spec: mujoco.MjSpec, origin: ModelOrigin) -> mujoco.MjModel:
         )
     if model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_GRAVITY:
         model.opt.gravity[:] = 0.0
+    return model
+
+
+def compile_urdf(spec: mujoco.MjSpec, origin: ModelOrigin) -> mujoco.MjModel:
+    """Compile what `urdf_spec` made, with every inertia as the file has it.
+
+    MuJoCo compiles no inertia that a rigid body cannot have, such as many files are shipped with, but
+    computes with one: the equations of motion ask only that the inertia in the joints is positive.
+
+    Raises:
+        ModelError: MuJoCo refuses it.
+    """
+    given = {
+        body.name: np.array(body.inertia)
+        for body in spec.bodies
+        if body.explicitinertial and is_impossible(np.array(body.inertia))
+    }
+    if not given:
+        return compile_spec(spec, origin)
+    spec.compiler.balanceinertia = True
+    model = compile_spec(spec, origin)
+    for name, moments in given.items():
+        model.body_inertia[model.body(name).id] = moments
+    mujoco.mj_setConst(model, mujoco.MjData(model))
     return model
 
 
@@ -374,11 +402,11 @@ def _free_mjcf(spec: mujoco.MjSpec, origin: ModelOrigin) -> None:
         key.qvel = np.concatenate([np.zeros(6), key.qvel]) if len(key.qvel) else key.qvel
 
 
-def _set_inertia(body: mujoco.MjsBody, urdf: Urdf, link: str) -> None:
-    mass, center, tensor = inertia(urdf, link)
-    if body.joints and mass < NEGLIGIBLE:
-        mass, tensor = NEGLIGIBLE, tensor + NEGLIGIBLE * np.eye(3)
+def _set_inertia(body: mujoco.MjsBody, inertial: ET.Element | None) -> None:
+    mass, center, tensor = inertia_of(inertial)
     moments, axes = np.linalg.eigh(tensor)
+    if body.joints:
+        mass, moments = max(mass, NEGLIGIBLE), np.maximum(moments, NEGLIGIBLE)
     if np.linalg.det(axes) < 0:
         axes[:, 2] *= -1.0
     quat = np.empty(4)
@@ -391,7 +419,7 @@ def _tool(model: mujoco.MjModel, frames: Sequence[NamedFrame], read: MjcfRobot) 
     """Return "tool" where it exists, else the last site or body of the longest chain.
 
     Bodies behind a joint that is held, and those of a hand, are left out: a tool that other motors
-    move is no frame of the arm's own.
+    move is no frame of the arm's own. So are sensors.
     """
     if any(frame.name == "tool" for frame in frames):
         return "tool"
@@ -401,7 +429,7 @@ def _tool(model: mujoco.MjModel, frames: Sequence[NamedFrame], read: MjcfRobot) 
         before, moves = model.body_parentid[body], bool(model.body_dofnum[body] > 0)
         depth[body] = depth[before] + [int(moves), 1]
         beyond[body] = body in hand if moves else (body in read.held or beyond[before])
-    own = [frame for frame in frames if not beyond[frame.body]]
+    own = [frame for frame in frames if not beyond[frame.body] and not senses(frame.name)]
     last = max((frame.body for frame in own), key=lambda body: (*depth[body], -body))
     return next(frame.name for frame in reversed(own) if frame.body == last)
 

@@ -17,8 +17,9 @@ import pinocchio as pin
 from opspace.errors import ModelError
 from opspace.robots.description import Description, ModelOrigin, unused
 from opspace.robots.joint_roles import JointChoice
+from opspace.robots.link_inertia import MOMENTS
 from opspace.robots.pinocchio_model import inertia_on_world
-from opspace.robots.urdf import MOMENTS, Urdf, describe_urdf, limit_warnings, reduce_urdf
+from opspace.robots.urdf import Urdf, describe_urdf, limit_warnings, reduce_urdf
 from opspace.robots.urdf_pose import matrix_rpy
 
 UNLIMITED = 1e30

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 
 from opspace.errors import ModelError, ModelWarning, missing_extra, unknown_name
 from opspace.robots.adapter import AdapterBase
+from opspace.robots.bent_reference import bent_reference
 from opspace.robots.catalogue import CATALOGUE, SHIPPED, CatalogueEntry, locate
 from opspace.robots.description import Description
 from opspace.robots.from_memory import is_model, read_model
@@ -98,7 +99,9 @@ def load_robot(
         tool: Default tool frame; the last of the longest chain where this is not given, short of
             hands and of joints that are held.
         reference: Reference posture: one number per coordinate, or positions by joint in rad or m;
-            joints that are not named stay where the file has them.
+            joints that are not named stay where the file has them. Where nothing is given it is the
+            key frame ``home`` or the first, else the middle of every range; where that is a singular
+            posture of an arm that has others, as little bent as does.
         armature: Inertia of the motor at every joint, rotor times gear ratio squared, kg·m² (kg of a
             slide), for which URDF has no word; None is 0.01 for humanoids by name, else 0. Without it
             a light joint, such as an ankle, has next to no inertia. MJCF files bring their own.
@@ -124,7 +127,7 @@ def load_robot(
         if choice.armature:
             raise ModelError("a model in memory says itself what armature its joints have")
         file = read_model(source, backend, floating_base, choice)
-        return _built(file, _chosen(file.description, tool, reference))
+        return _built(file, _chosen(file.description, tool, reference), reference is not None)
     if not isinstance(source, str | Path):
         raise ModelError(
             "a robot is loaded by name, from a file, or from a mujoco.MjModel, mujoco.MjSpec or "
@@ -132,7 +135,7 @@ def load_robot(
         )
     if isinstance(source, Path) or Path(source).suffix in SUFFIXES:
         file = read_robot(Path(source), backend, floating_base, choice)
-        return _built(file, _chosen(file.description, tool, reference))
+        return _built(file, _chosen(file.description, tool, reference), reference is not None)
     entry = _entry(source)
     path = locate(entry)
     if path is None:
@@ -144,7 +147,7 @@ def load_robot(
         choice = replace(choice, armature=entry.armature)
     file = read_robot(path, backend, free, choice)
     named = _named(file.description, source, entry)
-    return _built(file, _chosen(named, tool, reference))
+    return _built(file, _chosen(named, tool, reference), chosen=True)
 
 
 def _chosen(
@@ -174,10 +177,15 @@ def _chosen(
     return replace(description, q_reference=q)
 
 
-def _built(file: RobotFile, description: Description) -> AdapterBase:
+def _built(file: RobotFile, description: Description, chosen: bool) -> AdapterBase:
+    """Build the robot; where nobody has chosen its reference posture, one that is not singular."""
     for sentence in description.warnings:
         warn(f"{description.name}: {sentence}", ModelWarning, stacklevel=3)
-    return file.build(description)
+    robot = file.build(description)
+    if chosen or description.configurations:
+        return robot
+    bent = bent_reference(robot)
+    return robot if bent is None else file.build(replace(description, q_reference=bent))
 
 
 def _entry(name: str) -> CatalogueEntry:

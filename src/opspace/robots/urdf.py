@@ -25,12 +25,12 @@ from opspace.robots.joint_roles import (
     JointChoice,
     JointRoles,
     assign_roles,
-    hand_of,
 )
+from opspace.robots.link_inertia import MOMENTS, inertia_warnings
+from opspace.robots.tool_choice import hand_of, is_called_tool, senses
 from opspace.robots.urdf_pose import held_at
 
 VECTORS = {"xyz", "rpy"}
-MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 NUMBERS = VECTORS | {
     *MOMENTS,
     "value",
@@ -196,8 +196,22 @@ def describe_urdf(urdf: Urdf, floating_base: bool) -> Description:
         floating_base=floating_base,
         couplings=urdf.roles.couplings,
         locked=urdf.roles.locked,
-        warnings=(*urdf.roles.warnings, *limit_warnings(moving)),
+        warnings=(
+            *urdf.roles.warnings,
+            *limit_warnings(moving),
+            *inertia_warnings(_moved(urdf, floating_base)),
+        ),
     )
+
+
+def _moved(urdf: Urdf, floating_base: bool) -> dict[str, ET.Element | None]:
+    """Return the links that move."""
+    _, above = _above(urdf)
+    return {
+        link: inertial
+        for link, inertial in urdf.links.items()
+        if floating_base or above[link] is not None
+    }
 
 
 def limit_warnings(joints: Iterable[UrdfJoint]) -> Iterator[str]:
@@ -362,19 +376,28 @@ def _tool(urdf: Urdf) -> str:
     """Return the last link of the longest chain, counted in controlled and then in all joints.
 
     Links behind a joint that is held, and those of a hand, are left out: a tool that other motors
-    move is no frame of the arm's own.
+    move is no frame of the arm's own. So are sensors. Of what the chain moves last, the tool is the
+    link that carries the fingers of a hand, or what is fixed to that; and one that is called a tool.
     """
     carrier, above = _above(urdf)
     soft = {name for c in urdf.roles.couplings for name in (c.follower, c.leader)}
     hand = hand_of(((j.name, above[j.parent], carrier[j.parent]) for j in urdf.moving_joints), soft)
     depth, beyond = {urdf.root: (0, 0)}, {urdf.root: False}
+    palms = {joint.parent for joint in urdf.moving_joints if joint.name in hand}
+    held: dict[str, bool] = {urdf.root: urdf.root in palms}
     for joint in urdf.joints:
         moving, total = depth[joint.parent]
         depth[joint.child] = (moving + joint.moving, total + 1)
-        held = joint.name in urdf.roles.locked and joint.element.get("type") in MOVING
-        beyond[joint.child] = joint.name in hand if joint.moving else held or beyond[joint.parent]
-    own = [link for link in depth if not beyond[link]]
-    return max(own, key=lambda link: depth[link])
+        locked = joint.name in urdf.roles.locked and joint.element.get("type") in MOVING
+        beyond[joint.child] = joint.name in hand if joint.moving else locked or beyond[joint.parent]
+        on_palm = not joint.moving and held[joint.parent]
+        held[joint.child] = on_palm or joint.child in palms
+    own = [link for link in depth if not beyond[link] and not senses(link)] or [urdf.root]
+    last = carrier[max(own, key=lambda link: depth[link])]
+    return max(
+        (link for link in own if carrier[link] == last),
+        key=lambda link: (held[link], is_called_tool(link), depth[link]),
+    )
 
 
 def _above(urdf: Urdf) -> tuple[dict[str, str], dict[str, str | None]]:

@@ -11,12 +11,13 @@ import numpy as np
 
 from opspace.controller import Controller
 from opspace.errors import InputError
-from opspace.plan.calibration import BRAKE_RANGE, Calibration, sample_postures
+from opspace.plan.calibration import BRAKE_RANGE, STRUCTURAL, Calibration
 from opspace.plan.scales import Singularity
 from opspace.robots.adapter import AdapterBase, held_joints
 from opspace.robots.joint_units import joint_units
 from opspace.robots.motor_range import motor_range
 from opspace.robots.protocol import Robot
+from opspace.robots.sampled_postures import sample_postures
 from opspace.stack import Stack
 from opspace.tasks import OrientationTask, PositionTask, Task
 
@@ -122,7 +123,7 @@ def check_robot(robot: Robot) -> RobotCheck:
         calibration = controller.calibration
         sigma[task.name] = _sigma(controller)
         scale[task.name] = float(calibration.references[task.name][0])
-        warnings += _singular(task, sigma[task.name], option)
+        warnings += _singular(task, sigma[task.name], option, _directions(robot, task))
     robot.update(robot.q_reference, np.zeros(robot.nv))
     joints = _joints(robot, calibration)
     return RobotCheck(
@@ -210,21 +211,39 @@ def _known(value: float) -> float | None:
     return float(value) if math.isfinite(value) else None
 
 
-def _singular(task: Task, sigma: tuple[float, ...], option: Singularity) -> list[str]:
-    missing = task.rows - len(sigma)
-    if missing > 0:
-        return [f"{missing} of {task.rows} directions of the {task.name} cannot be moved at all"]
-    if sigma[-1] >= option.upper:
-        return []
+def _directions(robot: Robot, task: Task) -> int:
+    """Count the directions of a task that some posture moves: no other would bring more."""
+    most = 0
+    for q in islice(sample_postures(robot), POSTURES):
+        robot.update(q, np.zeros(robot.nv))
+        J = task.evaluate(robot, 0.0).J
+        sigma = np.linalg.eigvalsh(J @ np.linalg.solve(robot.M, J.T))
+        most = max(most, int(np.sum(sigma > STRUCTURAL * sigma[-1])))
+    return most
+
+
+def _singular(
+    task: Task, sigma: tuple[float, ...], option: Singularity, directions: int
+) -> list[str]:
+    found: list[str] = []
+    if directions < task.rows:
+        missing = task.rows - directions
+        found.append(
+            f"{missing} of {task.rows} directions of the {task.name} cannot be moved at all"
+        )
+    weakest = sigma[directions - 1] if 0 < directions <= len(sigma) else option.upper
+    if weakest >= option.upper:
+        return found
     released = option.buffer.release_upper
     effect = (
         f"below {released:.2g}, where lower levels pull at it and targets keep an error"
-        if sigma[-1] < released
+        if weakest < released
         else f"below {option.upper:g}, where it answers less and targets are reached later"
     )
     return [
+        *found,
         f"the reference posture is near a singularity of the {task.name}: the weakest "
-        f"eigenvalue {rounded(sigma[-1])} lies {effect}; load_robot(reference=...) takes another"
+        f"eigenvalue {rounded(weakest)} lies {effect}; load_robot(reference=...) takes another",
     ]
 
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
+    from rich.console import Console
     from rich.progress import TaskID
 
     from opspace.command import Command
@@ -25,8 +26,7 @@ class ProgressBar:
     """
 
     def __init__(self) -> None:
-        from rich.console import Console  # noqa: PLC0415 - slow to import
-        from rich.progress import (  # noqa: PLC0415
+        from rich.progress import (  # noqa: PLC0415 - slow to import
             BarColumn,
             Progress,
             TextColumn,
@@ -34,7 +34,7 @@ class ProgressBar:
             TimeRemainingColumn,
         )
 
-        console = Console(stderr=True)
+        console = _error_stream()
         self._progress = Progress(
             TextColumn("{task.description}", markup=False),
             BarColumn(),
@@ -111,8 +111,7 @@ def counter(what: str) -> Iterator[Callable[[int, int], None]]:
     Yields:
         A function that takes how many are done, and of how many.
     """
-    from rich.console import Console  # noqa: PLC0415 - slow to import
-    from rich.progress import (  # noqa: PLC0415
+    from rich.progress import (  # noqa: PLC0415 - slow to import
         BarColumn,
         MofNCompleteColumn,
         Progress,
@@ -121,7 +120,7 @@ def counter(what: str) -> Iterator[Callable[[int, int], None]]:
         TimeRemainingColumn,
     )
 
-    console = Console(stderr=True)
+    console = _error_stream()
     columns = (TextColumn(what, markup=False), BarColumn(), MofNCompleteColumn())
     times = (TimeElapsedColumn(), TextColumn("left", markup=False), TimeRemainingColumn())
     with Progress(*columns, *times, console=console, disable=not console.is_terminal) as progress:
@@ -131,3 +130,13 @@ def counter(what: str) -> Iterator[Callable[[int, int], None]]:
             progress.update(line, completed=done, total=total)
 
         yield show
+
+
+def _error_stream() -> Console:
+    """Return the error stream, which says nothing where it is no terminal."""
+    from rich.console import Console  # noqa: PLC0415 - slow to import
+
+    console = Console(stderr=True)
+    # A bar that is disabled ends with an empty line all the same in some versions of rich.
+    console.quiet = not console.is_terminal
+    return console

@@ -152,7 +152,7 @@ def _plant(
 
 
 def build_robot(scenario: Scenario) -> Robot:
-    """Load the robot of a scenario.
+    """Load the robot of a scenario, with the frames and the payload that it says.
 
     Args:
         scenario: The scenario.
@@ -161,26 +161,47 @@ def build_robot(scenario: Scenario) -> Robot:
         The robot.
 
     Raises:
-        ScenarioError: There is no robot of this name.
+        ScenarioError: There is no robot of this name, or a name or number does not fit it.
         ModelError: The robot's file cannot be used.
         MissingExtraError: The robot is not installed.
     """
+    own_tool = scenario.tool in scenario.frames
     try:
-        return load_robot(
+        robot = load_robot(
             scenario.robot,
             backend=scenario.backend,
             floating_base=scenario.floating_base,
             joints=scenario.joints,
             locked=scenario.locked,
-            tool=scenario.tool,
+            tool=None if own_tool else scenario.tool,
+            reference=scenario.reference,
         )
     except UnknownNameError as error:
         raise scenario.error((_key_of(scenario, error.name),), str(error)) from error
+    for name, frame in scenario.frames.items():
+        try:
+            robot.add_frame(name, frame.parent, frame.placement)
+        except (InputError, UnknownNameError) as error:
+            raise scenario.error(("frames", name), str(error)) from error
+    if own_tool:
+        assert scenario.tool is not None
+        robot.tool = scenario.tool
+    if scenario.payload is not None:
+        try:
+            robot.payload = scenario.payload.build()
+        except (InputError, UnknownNameError) as error:
+            raise scenario.error(("payload",), str(error)) from error
+    return robot
 
 
 def _key_of(scenario: Scenario, name: str) -> str:
     """Return the key that gave a name."""
-    named = {"joints": scenario.joints or (), "locked": scenario.locked, "tool": (scenario.tool,)}
+    named = {
+        "joints": scenario.joints or (),
+        "locked": scenario.locked,
+        "tool": (scenario.tool,),
+        "reference": scenario.reference or (),
+    }
     return next((key for key, names in named.items() if name in names), "robot")
 
 

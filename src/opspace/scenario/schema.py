@@ -14,6 +14,7 @@ from opspace.scenario.document import Document, Key, key_text
 from opspace.scenario.events import Event, ProfileName, check_events
 from opspace.scenario.fields import Checked, Entry, Number, listed, problem, shown, whole
 from opspace.scenario.obstacle_entries import CollisionsEntry
+from opspace.scenario.robot_entries import FrameEntry, PayloadEntry
 from opspace.scenario.surface_entries import HoleEntry, SurfaceEntry
 from opspace.scenario.targets import Configuration
 from opspace.scenario.task_entries import AnyTask
@@ -203,6 +204,17 @@ class Scenario(Entry):
     )
     tool: str | None = Field(
         default=None, description="default tool frame; that of the robot where not given"
+    )
+    reference: dict[str, Annotated[float, Number("rad or m")]] | None = Field(
+        default=None,
+        description="joint: its position in the reference posture; others stay where the file has "
+        "them",
+    )
+    frames: dict[str, FrameEntry] = Field(
+        default_factory=dict, description="name: a frame of one's own, fixed to another"
+    )
+    payload: PayloadEntry | None = Field(
+        default=None, description="what the robot carries; null is nothing"
     )
     duration: Annotated[float, Number("s", above=0.0, at_most=3600.0)] = Field(
         description="simulated time [s]"

@@ -15,6 +15,7 @@ import numpy as np
 
 from opspace.contacts import GroundContact, SoleContact
 from opspace.errors import InputError, unknown_name
+from opspace.sim.held_load import place_of
 
 RADIUS = 0.005
 """Of the balls that touch, m."""
@@ -193,16 +194,9 @@ def corners(contact: GroundContact) -> Iterator[np.ndarray]:
 
 def _body(spec: Any, contact: GroundContact) -> tuple[Any, np.ndarray, np.ndarray]:
     """Find the body of a frame, and where the frame is in it."""
-    import mujoco  # noqa: PLC0415 - an extra, and slow to import
-
-    body = spec.body(contact.frame)
-    if body is not None:
-        return body, np.eye(3), np.zeros(3)
-    site = spec.site(contact.frame)
-    if site is None:
+    place = place_of(spec, contact.frame)
+    if place is None:
         raise InputError(
             f"contact {contact.name!r}: the simulated robot has no body or site {contact.frame!r}"
         )
-    matrix = np.zeros(9)
-    mujoco.mju_quat2Mat(matrix, site.quat)
-    return site.parent, matrix.reshape(3, 3), np.array(site.pos)
+    return place

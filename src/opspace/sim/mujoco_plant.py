@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from opspace.robots.adapter import spread_of
 from opspace.robots.motor_range import motor_range
 from opspace.sim.disturbances import NO_DISTURBANCES, Disturbances, Hand, Wire
 from opspace.sim.ground import Ground
+from opspace.sim.held_load import add_loads, loads_by_frame
 from opspace.sim.hole import Hole
 from opspace.sim.surfaces import Surface, TouchedWorld
 
@@ -36,7 +38,7 @@ class Plant:
     """A robot in MuJoCo with nothing between the command and its joints but what is asked for.
 
     Args:
-        robot: The robot whose file is simulated.
+        robot: The robot whose file is simulated, with what it carries when the plant is made.
         q: Configuration at the start, (nq,).
         v: Velocity at the start, (n,), rad/s; zero where not given.
         dt: Time step, s.
@@ -82,7 +84,7 @@ class Plant:
         if robot.source is None:
             raise ModelError(f"robot {robot.name!r} has no file that a simulator could load")
         self._mujoco = mujoco
-        self.model = model_of(robot, None if ground is None else ground.add_to)
+        self.model = model_of(robot, partial(_extend, loads_by_frame(robot), ground))
         self.model.opt.timestep = dt / self._substeps
         self._ground = ground
         # Implicit in the velocity: stable for stiff friction, exact for a frictionless arm to O(dt).
@@ -237,6 +239,13 @@ class Plant:
     def _own(self, values: np.ndarray) -> np.ndarray:
         """Leave the joints that lead; those that follow belong to the simulation."""
         return values if self._spread is None else values[self._spread.leaders]
+
+
+def _extend(loads: Mapping[str, np.ndarray], ground: Ground | None, spec: Any) -> None:
+    """Add what the file of the robot has not."""
+    add_loads(spec, loads)
+    if ground is not None:
+        ground.add_to(spec)
 
 
 def _checked_substeps(substeps: int | None, dt: float, touching: bool) -> int:
