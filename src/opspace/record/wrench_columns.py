@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -24,6 +24,19 @@ _NOTHING = np.full(len(PARTS), np.nan)
 def sensors_of(tasks: Sequence[Task]) -> tuple[str, ...]:
     """List the frames whose wrenches some prepared tasks need."""
     return tuple(dict.fromkeys(task.sensor for task in tasks if isinstance(task, ForceTask)))
+
+
+def subject_of_touch(task: ForceTask) -> dict[str, Any]:
+    """Describe where and with what a force task presses in JSON's own types."""
+    source = task.source
+    return {
+        "sensor": task.sensor,
+        "offset": None if source.offset is None else source.offset.tolist(),
+        "selection": task.selection.tolist(),
+        "in_tool_axes": task.in_tool_axes,
+        "force": task.force.tolist(),
+        "least": task.thresholds[1],
+    }
 
 
 def columns_of_wrenches(sensors: Sequence[str]) -> list[Column]:
