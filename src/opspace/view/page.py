@@ -87,7 +87,9 @@ class Page:
         )
         touching = self._about.get(GROUP, {})
         self._contacts = ContactScene(self._server, robot, touching) if touching else None
-        self._presses = {n: one["press"] for n, one in self._about["tasks"].items() if "press" in one}
+        self._presses = {
+            n: one["press"] for n, one in self._about["tasks"].items() if "press" in one
+        }
         self._touches: TouchScene | None = None
         if self._presses:
             self._touches = TouchScene(self._server, robot, self._presses, _touched(self._about))
