@@ -101,6 +101,8 @@ def test_an_arm_presses_by_what_its_joints_feel(noise):
 def test_what_cannot_be_is_refused():
     with pytest.raises(InputError, match="fade"):
         osc.JointTorqueSensor(ROBOT, fade=(0.1, 0.1))
+    with pytest.raises(InputError, match="lever"):
+        osc.JointTorqueSensor(ROBOT, lever=0.0)
     with pytest.raises(UnknownNameError, match="nowhere"):
         osc.JointTorqueSensor(ROBOT, "nowhere")
     with pytest.raises(InputError, match="6 finite"):

@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from opspace.errors import InputError
-from opspace.law.scalars import LEVER, QUINTIC, profile
 
 if TYPE_CHECKING:
     from opspace.robots.protocol import Robot
@@ -26,13 +25,14 @@ class JointTorqueSensor:
     so that what pushes elsewhere on a redundant arm is seen only as far as it moves the frame. In a
     direction in which the arm can hardly move, 1/σ of that matrix is large and so is what becomes of an
     error of τ_e: it fades from the estimate as σ falls through ``fade``, and the estimate is 0 there.
-    Moments count with a lever of `opspace.law.scalars.LEVER`.
+    Moments are put beside forces by a lever.
 
     Args:
         robot: The robot; it is left alone.
         frame: Name of the frame that touches; None is the tool.
         moments: Whether moments are estimated as well. With False all is put down to a force at the
             frame's origin, which is more exact where a point touches.
+        lever: What a moment is divided by to count like a force, m.
         fade: Eigenvalues σ (absent, full) of J A⁻¹ Jᵀ, 1/kg.
 
     Raises:
@@ -46,14 +46,17 @@ class JointTorqueSensor:
         frame: str | None = None,
         *,
         moments: bool = True,
+        lever: float = 0.1,
         fade: tuple[float, float] = (0.002, 0.01),
     ) -> None:
         if not 0.0 < fade[0] < fade[1] < np.inf:
             raise InputError(f"fade of a joint torque sensor must be 0 < absent < full, not {fade}")
+        if not 0.0 < lever < np.inf:
+            raise InputError(f"lever of a joint torque sensor must be above 0 m, not {lever}")
         self._robot = robot.fresh()
         self.frame = robot.tool if frame is None else frame
         self._id = self._robot.frame_id(self.frame)
-        self._levers = np.array([1.0, 1.0, 1.0, LEVER, LEVER, LEVER])[: 6 if moments else 3]
+        self._levers = np.array([1.0, 1.0, 1.0, lever, lever, lever])[: 6 if moments else 3]
         self._fade = fade
 
     def wrench(self, q: ArrayLike, external: ArrayLike) -> np.ndarray:
@@ -74,12 +77,13 @@ class JointTorqueSensor:
         felt = np.array(external, dtype=float)
         if felt.shape != (robot.nv,) or not np.all(np.isfinite(felt)):
             raise InputError(f"external torques must be {robot.nv} finite numbers, got {external}")
-        robot.update(q, np.zeros(robot.nv))
+        robot.update(np.array(q, dtype=float), np.zeros(robot.nv))
         J = levers[:, None] * robot.jacobian(self._id)[: levers.size]
         moved = np.linalg.solve(robot.M, np.column_stack([J.T, felt]))
         sigma, axes = np.linalg.eigh(J @ moved[:, :-1])
         absent, full = self._fade
-        seen = [profile(QUINTIC, (s - absent) / (full - absent)) for s in sigma.tolist()]
+        part = np.clip((sigma - absent) / (full - absent), 0.0, 1.0)
+        seen = part * part * (3.0 - 2.0 * part)
         parts = axes.T @ (J @ moved[:, -1]) * seen / np.maximum(sigma, absent)
         found = np.zeros(6)
         found[: levers.size] = -levers * (axes @ parts)
