@@ -10,7 +10,7 @@ import viser
 
 from opspace.robots.protocol import Robot
 from opspace.view import contact_shapes as shapes
-from opspace.view.contact_scene import MEASURED, PLANNED
+from opspace.view.contact_scene import MEASURED
 from opspace.view.frame import Frame, TouchFrame
 from opspace.view.panels import blend_rgb
 from opspace.view.touched_shapes import touched_mesh
@@ -19,6 +19,8 @@ WANTED_LENGTH = 0.2
 """Length of an arrow of the largest force that is wanted at the start, m."""
 MOST_LENGTH = 0.6
 """No arrow is longer, m: the first peak of a touch is many times what is wanted."""
+COMMANDED = (170, 51, 119)
+"""Unlike the weakest direction, which often lies along the force."""
 _BALL = 0.012
 _SURFACE_COLOR = (150, 165, 175)
 
@@ -47,7 +49,7 @@ class TouchScene:
         # A wide one around a narrow one: where they agree both are seen.
         self._measured, self._commanded = (
             server.scene.add_line_segments(f"/touch/{name}", nothing, color, thickness=width)
-            for name, color, width in (("measured", MEASURED, 0.012), ("commanded", PLANNED, 0.005))
+            for name, color, width in (("measured", MEASURED, 0.012), ("commanded", COMMANDED, 0.005))
         )
         self._balls = {
             name: server.scene.add_icosphere(f"/touch/{name}", radius=_BALL, visible=False)
