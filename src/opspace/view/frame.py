@@ -14,6 +14,7 @@ from opspace.record.growing import GrowingRecording
 from opspace.record.obstacle_columns import GROUP as OBSTACLES
 from opspace.record.obstacle_columns import HEADER_KEY, PARTS, placing_of
 from opspace.record.wrench_columns import GROUP as WRENCHES
+from opspace.record.wrench_columns import RECENT, latest
 from opspace.tasks.obstacles import Placing
 
 
@@ -101,8 +102,6 @@ class TouchFrame:
 
 
 _NOWHERE = np.full(3, np.nan)
-_RECENT = 10
-"""A wrench that none of so many ticks has brought is not shown."""
 
 
 @dataclass(frozen=True)
@@ -273,15 +272,14 @@ class FrameReader:
         places, (h, _, error) = self._touches[name], self._tasks[name]
         # The memory of a task that has left the stack stays as it was.
         there = 0.0 if math.isfinite(values[h]) else math.nan
-        recent = self.recording.data[max(row + 1 - _RECENT, 0) : row + 1, places["wrench"]]
-        known = recent[~np.isnan(recent).any(axis=1)]
+        recent = self.recording.data[max(row + 1 - RECENT, 0) : row + 1, places["wrench"]]
         return TouchFrame(
             name,
             float(values[h]),
             float(values[places["confidence"][0]]) + there,
             values[error] + values[places["measured"]],
             values[places["commanded"]] + there,
-            known[-1] if len(known) else _NOWHERE,
+            latest(recent, len(recent) - 1),
         )
 
     def _level(self, number: str) -> tuple[list[int], list[int], list[int]]:

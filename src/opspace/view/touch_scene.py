@@ -49,7 +49,10 @@ class TouchScene:
         # A wide one around a narrow one: where they agree both are seen.
         self._measured, self._commanded = (
             server.scene.add_line_segments(f"/touch/{name}", nothing, color, thickness=width)
-            for name, color, width in (("measured", MEASURED, 0.012), ("commanded", COMMANDED, 0.005))
+            for name, color, width in (
+                ("measured", MEASURED, 0.012),
+                ("commanded", COMMANDED, 0.005),
+            )
         )
         self._balls = {
             name: server.scene.add_icosphere(f"/touch/{name}", radius=_BALL, visible=False)
