@@ -279,8 +279,8 @@ def slide(page, label, value):
 
 
 def yellow(image):
-    """How much of the picture is the arrow of a measured force."""
-    red, green, blue = image[150:, :900].transpose(2, 0, 1)
+    """How much of the picture, below its notes, is the arrow of a measured force."""
+    red, green, blue = image[200:, :900].transpose(2, 0, 1)
     return int(((red > 170) & (green > 120) & (blue < 110) & (red - blue > 90)).sum())
 
 
