@@ -62,6 +62,7 @@ if TYPE_CHECKING:
     from opspace.record.observer import TickRecorder as TickRecorder
     from opspace.record.replay import Replay as Replay
     from opspace.record.replay import replay as replay
+    from opspace.robots import JointTorqueSensor as JointTorqueSensor
     from opspace.robots import Payload as Payload
     from opspace.robots import Robot as Robot
     from opspace.robots import RobotInfo as RobotInfo
@@ -137,7 +138,9 @@ _NAMES = {
     "opspace.record.black_box": "BlackBox",
     "opspace.record.observer": "TickRecorder",
     "opspace.record.replay": "Replay replay",
-    "opspace.robots": "Payload Robot RobotInfo WristSensor available_robots load_robot",
+    "opspace.robots": (
+        "JointTorqueSensor Payload Robot RobotInfo WristSensor available_robots load_robot"
+    ),
     "opspace.robots.shapes": "LinkCapsule",
     "opspace.loop": (
         "AnyPlant Driver DriverFacts Loop LoopReport Observer Outcome RealTime RobotState Stepping "

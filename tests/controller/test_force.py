@@ -281,6 +281,19 @@ def test_a_wrench_of_the_running_tick_that_is_none_is_refused_and_leaves_nothing
     np.testing.assert_array_equal(controller.wrenches[TOOL], good)
 
 
+@KINDS
+def test_what_was_given_is_told_whatever_joins_before_a_wrench_is_refused(kind):
+    controller = kind(ROBOT.fresh(), osc.Stack([osc.ForceTask(name="press"), osc.PostureTask()]))
+    q, v = state(ROBOT)
+    good = on_environment(placed(q, v), 3.0)
+    for i in range(3):
+        controller.step(i * DT, q, v, wrenches={TOOL: good})
+    controller.stack.insert(osc.ForceTask(name="other"), level=0, duration=0.1)
+    with pytest.raises(InputError, match="wrench"):
+        controller.step(3 * DT, q, v, wrenches={TOOL: np.full(6, np.nan)})
+    np.testing.assert_array_equal(controller.wrenches[TOOL], good)
+
+
 @pytest.mark.parametrize(
     "as_given",
     [

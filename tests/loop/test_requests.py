@@ -27,6 +27,8 @@ REQUESTS = st.one_of(
     st.builds(RunRequest, st.just("swap"), st.tuples(NAMES, NAMES), duration=DURATIONS),
     st.builds(RunRequest, st.just("lead"), st.tuples(NAMES), position=POINTS),
     st.builds(RunRequest, st.just("gain"), st.tuples(NAMES), kp=st.floats(0.0, 1e3)),
+    st.builds(RunRequest, st.just("press"), st.tuples(NAMES), force=POINTS),
+    st.builds(RunRequest, st.just("spring"), st.tuples(NAMES), stiffness=POINTS),
 )
 
 
@@ -80,7 +82,7 @@ JSON = st.recursive(
 )
 ODD = st.sampled_from([True, 10**400, -1, [], {}, [1.0, 2.0], "5", [0.0] * 4, [1e30] * 3])
 KEYS = st.sampled_from(
-    ["level", "duration", "position", "orientation", "kp", "color"],
+    ["level", "duration", "position", "orientation", "kp", "force", "stiffness", "color"],
 )
 VALUES = JSON | ODD | st.floats(-1e3, 1e3) | POINTS.map(list)
 TASKS = st.sampled_from(["position", "elbow", "posture", "nobody"])
@@ -125,6 +127,11 @@ def _shared_run(found=[]):  # noqa: B006 - one for all examples, which change no
         ({"kind": "insert", "tasks": ["a"], "wait": True}, "does not take wait"),
         ({"kind": "remove", "tasks": ["a"], "wait": 1}, "true or false"),
         ({"kind": "gain", "tasks": ["a"]}, "needs kp"),
+        ({"kind": "press", "tasks": ["a"]}, "needs force"),
+        ({"kind": "press", "tasks": ["a"], "force": 5.0}, "list of numbers"),
+        ({"kind": "press", "tasks": ["a"], "force": [True]}, "must be a number"),
+        ({"kind": "press", "tasks": ["a"], "force": [5.0], "duration": 1.0}, "duration"),
+        ({"kind": "spring", "tasks": ["a"], "stiffness": [[5.0]]}, "must be a number"),
         ({"tasks": ["a"]}, "kind"),
         ({"kind": "gain", "tasks": ["a"], "kp": "5"}, "kp"),
         ({"kind": "gain", "tasks": ["a"], "kp": True}, "kp"),

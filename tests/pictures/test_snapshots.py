@@ -13,7 +13,10 @@ from PIL import Image
 from opspace.errors import InputError, OpspaceError, UnknownNameError
 from opspace.pictures.offscreen import SnapshotUnavailableError, camera_axes, fit_view
 from opspace.pictures.snapshots import snapshot_strip, snapshots
+from opspace.pictures.touched_drawn import TouchedDrawn
 from opspace.robots import load_robot
+from opspace.runs.run import run_scenario
+from opspace.scenario import load_scenario
 from tests.plots import inspection
 
 SIZE = (120, 90)
@@ -43,6 +46,36 @@ def test_the_sphere_is_at_the_desired_position(run, robot):
     assert np.sum((shown[..., 0] > 150) & (shown[..., 1] < 90)) > 3
     hidden = snapshots(run, robot, [3.5], task="none", **options)[0].astype(int)
     assert np.sum((hidden[..., 0] > 150) & (hidden[..., 1] < 50)) == 0
+
+
+@pytest.fixture(scope="module")
+def pressing(tmp_path_factory):
+    """A run that presses from 0.55 s on."""
+    scenario = load_scenario("wipe", ["duration=0.8"])
+    return run_scenario(scenario, tmp_path_factory.mktemp("pressing") / "run").recording
+
+
+def test_a_force_is_an_arrow_as_long_as_it_is(pressing):
+    drawn = TouchedDrawn(pressing)
+    wrench = pressing.group("wrench/tool")[:, :3]
+    found = drawn.arrow(750)
+    np.testing.assert_allclose(found, 0.02 * wrench[750])
+    peak = int(np.argmin(wrench[:, 2]))
+    assert np.linalg.norm(drawn.arrow(peak)) <= 0.6 + 1e-12
+    in_the_air = [drawn.arrow(row) for row in range(0, 400, 10)]
+    assert all(arrow is None or np.linalg.norm(arrow) < 0.03 for arrow in in_the_air)
+
+
+@pytest.mark.usefixtures("opengl")
+def test_what_is_pressed_is_in_the_picture(pressing, robot, monkeypatch):
+    def picture():
+        return snapshots(pressing, robot, [0.75], size=(480, 420), task="none")[0].astype(int)
+
+    shown = picture()
+    monkeypatch.setattr(TouchedDrawn, "draw", lambda *given: None)
+    changed = shown - picture()
+    assert np.sum(np.abs(changed).max(axis=2) > 10) > 5000  # the table
+    assert np.sum(changed[..., 0] - changed[..., 2] > 30) > 50  # the arrow
 
 
 @pytest.mark.usefixtures("opengl")

@@ -145,6 +145,29 @@ def test_the_others_as_shipped(tmp_path, name, most, millimetres):
 
 
 @pytest.mark.slow
+def test_a_hand_presses_a_wall_with_twenty_newtons_and_the_feet_carry_them(tmp_path):
+    scenario, recording = run(tmp_path, "humanoid-press")
+    pressing = (recording.t > 2.0) & (recording.t < scenario.events[0].at)
+    # What is measured on the soles is the truth; the wrench is late and has noise.
+    along, up = (
+        sum(recording[f"contacts/{side}/measured/{axis}"] for side in ("left", "right"))
+        for axis in "xz"
+    )
+    hand = recording.group("wrench/right_rubber_hand")[:, 0]
+    weight = up[recording.t < 1.0][-1]
+    com = 1e3 * np.max(np.linalg.norm(recording.group("tasks/com/error"), axis=1))
+    print(along[pressing].mean(), along[pressing].std(), up[pressing].mean() - weight, com)
+    print(largest_torque_step(recording, 0.005, 10.0))
+    assert np.sqrt(np.mean((along[pressing] - 20.0) ** 2)) <= 0.2
+    assert np.mean(hand[pressing]) == pytest.approx(20.0, abs=0.1)
+    assert up[pressing].mean() == pytest.approx(weight, abs=5.0)
+    assert abs(along[-1]) <= 1.0
+    assert com <= 1.0
+    assert largest_torque_step(recording, 0.005, 10.0) <= 0.5
+    assert not (recording["status"].astype(int) & int(Status.FALLING | Status.NOT_BALANCED)).any()
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("unnoticed", [0.01, 0.03])
 def test_a_lost_foot_is_noticed_and_let_go(unnoticed):
     """The floor falls away below one foot while the centre of mass is over the other."""

@@ -28,12 +28,14 @@ class Touched:
         force: True force on the table, N.
         confidence: Of the contact.
         away: Distance from the circle along the table, m.
+        turned: Angle from upright, rad.
     """
 
     tau: np.ndarray
     force: np.ndarray
     confidence: np.ndarray
     away: np.ndarray
+    turned: np.ndarray
 
     @property
     def step(self) -> float:
@@ -49,9 +51,22 @@ class Touched:
         return int(np.sum(touching[:-1] & ~touching[1:]))
 
     @property
+    def crossings(self) -> int:
+        """How often the confidence crossed a half."""
+        sure = self.confidence > 0.5
+        return int(np.sum(sure[1:] != sure[:-1]))
+
+    @property
     def rms(self) -> float:
         """Error of the force on the circle once it goes at its speed, N."""
-        return float(np.sqrt(np.mean((self.force[round((AFTER + 0.5) / DT) :] - FORCE) ** 2)))
+        return self.wiping["force"]
+
+    @property
+    def wiping(self) -> dict[str, float]:
+        """Errors (RMS) on the circle once it goes at its speed: N, m and rad."""
+        late = slice(round((AFTER + 0.5) / DT), None)
+        errors = {"force": self.force - FORCE, "away": self.away, "turned": self.turned}
+        return {name: float(np.sqrt(np.mean(x[late] ** 2))) for name, x in errors.items()}
 
 
 class HardContact:
@@ -102,7 +117,7 @@ def down_and_around(start, speed, travel=0.2):
 
 def touch_and_wipe(
     way, *, stiffness=1e5, speed=0.1, seconds=AFTER, robot="puma560", approach=0.04, table=0.08,
-    plant=ROUGH, size=math.inf,
+    plant=ROUGH, size=math.inf, off=0.0,
 ) -> Touched:  # fmt: skip
     """Run one way of coming into contact.
 
@@ -116,6 +131,7 @@ def touch_and_wipe(
         table: How far below the start it is, m.
         plant: What is wrong with the plant.
         size: Radius of the table around the start, m; its rim falls away over 15 mm.
+        off: How much higher the table is believed to be than it is, m.
     """
     arm = osc.load_robot(robot)
     arm.update(arm.q_reference, np.zeros(arm.nv))
@@ -128,20 +144,22 @@ def touch_and_wipe(
     if way == "contact":
         press.activation = osc.Contact(press)
     elif way == "distance":
-        press.activation = osc.ActivationUnion(osc.Contact(press), Height(height))
+        press.activation = osc.ActivationUnion(osc.Contact(press), Height(height + off))
     elif way == "hard":
         press.activation = HardContact(press)
     hand = osc.PositionTask(target=osc.GiveWay(down_and_around(start, speed), press), kp=400.0)
     turn = osc.OrientationTask(target=upright, kp=400.0)
     stack = osc.Stack([press, turn, hand, osc.PostureTask(arm.q_reference, kp=20.0)])
-    controller = osc.Controller(arm, stack, period=DT)
+    # What is measured is the touch, and nothing else that fades.
+    controller = osc.Controller(arm, stack, period=DT, singularity=None)
     surface = osc.Surface([*start[:2], height], stiffness=stiffness, size=size, bevel=0.015)
     world = osc.Plant(arm, arm.q_reference, surfaces=[surface], disturbances=plant)
     rows = []
     for i in range(round(seconds / DT)):
         q, v = world.measure()
         command = controller.step(i * DT, q, v, wrenches=world.wrenches())
-        where = arm.position(tool)[:2] - hand.target(i * DT).x[:2]
-        rows.append((command.tau, -world.exerted[2], press.touch.confidence, np.linalg.norm(where)))
+        where = np.linalg.norm(command.tasks[hand.name].error[:2])
+        how = np.linalg.norm(command.tasks[turn.name].error)
+        rows.append((command.tau, -world.exerted[2], press.touch.confidence, where, how))
         world.advance(command.tau)
     return Touched(*(np.array(column) for column in zip(*rows, strict=True)))

@@ -58,6 +58,18 @@ collisions:
     ball: {shape: ball, radius: 0.08, position: [0.5, 0.45, 0.6]}
     table: {shape: half-space, position: [0, 0, 0.1], normal: [0, 0, 1], ignore: [panda_link1]}
 """
+PRESSED = """
+robot: puma560
+duration: 1.0
+tasks:
+  press: {type: force, level: 0, force: -10, axes_frame: world, contact: [1, 4]}
+  upright: {type: orientation, level: 1, kp: 400}
+  spring: {type: impedance, level: 2, stiffness: [800, 800, 0]}
+  posture: {type: posture, level: 3, kp: 20}
+plant:
+  surfaces:
+    - {point: [0.64, -0.15, 0.766], stiffness: 10000}
+"""
 PICTURES = Path(os.environ.get("OPSPACE_SCREENSHOTS", ""))
 """Where screenshots are kept to be looked at; not at all where the variable is not set."""
 
@@ -230,6 +242,46 @@ def test_an_obstacle_is_dragged_at_the_arm(run, chromium):
     assert np.abs(np.diff(recording.group("tau"), axis=0)).max() < 3.0
     again = run_scenario(load_scenario(out / SCENARIO), out.parent / "again", requests=out / FILE)
     np.testing.assert_array_equal(again.recording.data, recording.data)
+
+
+@pytest.mark.parametrize("run", [PRESSED], indirect=True)
+def test_a_table_is_pressed_harder_from_the_page(run, chromium):
+    out, address, process = run
+    page = opened(chromium, address)
+    bar = page.locator("[data-opspace-touch='press']")
+    until(lambda: bar.get_attribute("data-opspace-c") == "1.000", "the table was touched")
+    assert "10.0 N" in bar.inner_text()
+    until(lambda: yellow(picture(page, "pressing-10")) > 20, "the force was drawn")
+    before = yellow(picture(page, "pressing-10"))
+    slide(page, "press [N]", 30.0)
+    until(lambda: asked(out), "another force was asked for")
+    until(lambda: "30.0 N" in bar.inner_text(), "it was there")
+    until(lambda: yellow(picture(page, "pressing-30")) > 2.0 * before, "the arrow grew")
+    slide(page, "spring [%]", 50.0)
+    until(lambda: asked(out)[-1]["kind"] == "spring", "a softer spring was asked for")
+    time.sleep(1.0)
+    page.close()
+    process.send_signal(signal.SIGINT)
+    process.wait(60.0)
+    recording = load(out)
+    assert recording["wrench/tool/z"][-1] == pytest.approx(-30.0, abs=0.5)
+    assert asked(out)[-1]["stiffness"] == [400.0, 400.0, 0.0]
+    again = run_scenario(load_scenario(out / SCENARIO), out.parent / "again", requests=out / FILE)
+    np.testing.assert_array_equal(again.recording.data, recording.data)
+
+
+def slide(page, label, value):
+    """Type a number beside a slider."""
+    beside = "xpath=ancestor::div[.//input[@type='text']][1]//input[@type='text']"
+    field = page.get_by_text(label, exact=True).locator(beside)
+    field.fill(f"{value:g}")
+    field.press("Enter")
+
+
+def yellow(image):
+    """How much of the picture, below its notes, is the arrow of a measured force."""
+    red, green, blue = image[200:, :900].transpose(2, 0, 1)
+    return int(((red > 170) & (green > 120) & (blue < 110) & (red - blue > 90)).sum())
 
 
 def load_rows(out):

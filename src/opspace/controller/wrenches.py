@@ -8,7 +8,6 @@ from math import isfinite
 from typing import Any, TypeAlias, cast
 
 import numpy as np
-from numpy import ndarray
 from numpy.typing import ArrayLike
 
 from opspace.command import Status
@@ -24,6 +23,9 @@ STALE = int(Status.WRENCH_STALE)
 TAKEN = slice(GIVEN, GIVEN + 6)
 FROZEN = ~(Status.OK | Status.DIRECTION_OFF | Status.LATE)
 """What keeps the integrals of forces where they are."""
+
+_NO_WRENCH = (KeyError, AttributeError, TypeError, ValueError, NotImplementedError)
+"""What goes wrong with what is no array of six floats."""
 
 Wrenches: TypeAlias = Mapping[str, ArrayLike | None]
 """Wrench of the robot on the environment, (6,) N and N·m in world axes at the point of the task, by name
@@ -45,15 +47,13 @@ class WrenchInput:
         self._present: list[tuple[ForceTask, str]] = []
         self._away: list[tuple[weakref.ref[ForceTask], str]] = []
         self._only: tuple[str, TouchMemory, Array, Any] | None = None
-        self._given: Mapping[str, Array | None] | None = {}
-        self._taken: tuple[str, list[float]] = "", []
+        self._given: Mapping[str, Array | None] = {}
+        self._taken: list[float] | None = None
 
     @property
     def given(self) -> Mapping[str, Array | None]:
         """What was given in the last tick, by name of the frame."""
-        if self._given is None:
-            sensor, found = self._taken
-            self._given = {sensor: np.array(found)}
+        self._settle()
         return self._given
 
     def add(self, task: ForceTask) -> None:
@@ -84,17 +84,19 @@ class WrenchInput:
         # does not pass them goes the long way, which says what is wrong.
         if self._only is not None and type(wrenches) is dict and len(wrenches) == 1:
             sensor, memory, row, numbers = self._only
-            value = wrenches.get(sensor)
-            if type(value) is ndarray and memory.row is row:
+            if memory.row is row:
                 try:
+                    value: Any = wrenches[sensor]
                     found = value.tolist()
-                    if isfinite(sum(found)):
+                    a, b, c, d, e, f = found
+                    if isfinite(a + b + c + d + e + f):
                         numbers[TAKEN] = value  # refuses other shapes and kinds of numbers
                         numbers[GIVEN_AT] = t
-                        self._given, self._taken = None, (sensor, found)
+                        self._taken = found
                         return 0
-                except (TypeError, ValueError, NotImplementedError):
+                except _NO_WRENCH:
                     pass
+        self._settle()
         given = {name: self._checked(name, value) for name, value in (wrenches or {}).items()}
         status = 0
         for task, sensor in self._present:
@@ -122,8 +124,15 @@ class WrenchInput:
         self._members = members
         self._look_for_one()
 
+    def _settle(self) -> None:
+        """Make an array of what the short way has taken, which nearly nobody asks for."""
+        if self._taken is not None:
+            assert self._only is not None
+            self._given, self._taken = {self._only[0]: np.array(self._taken)}, None
+
     def _look_for_one(self) -> None:
         """Find out whether a single task asks for its wrench, and where it keeps it."""
+        self._settle()
         self._only = None
         if len(self._present) != 1 or self._away:
             return

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -15,6 +15,10 @@ JOINTS = 7
 PERIOD = 1e-3
 TORQUE_RATE = 1000.0
 """What the robot takes between two commands; more is the reflex ``controller_torque_discontinuity``."""
+
+
+Felt = Callable[[np.ndarray, np.ndarray], Mapping[str, np.ndarray]]
+"""Makes the wrenches of a tick of q (n,) and external torques (n,)."""
 
 
 def _import_pylibfranka() -> Any:
@@ -38,6 +42,9 @@ class FrankaDriver:
         host: Address of the robot.
         real_time: Refuse to start without a real-time kernel, as the client does by itself.
         collision: Torque, N·m, and force, N, beyond which the robot stops; None leaves what it has.
+        felt: Makes wrenches of q and the robot's estimate of the external torques,
+            ``tau_ext_hat_filtered``, for force tasks: `opspace.JointTorqueSensor.wrenches`, or what
+            negates them first where pressing shows the other sign. None is no wrench.
 
     Raises:
         MissingExtraError: `pylibfranka` is not installed.
@@ -49,12 +56,18 @@ class FrankaDriver:
     )
 
     def __init__(
-        self, host: str, *, real_time: bool = True, collision: tuple[float, float] | None = None
+        self,
+        host: str,
+        *,
+        real_time: bool = True,
+        collision: tuple[float, float] | None = None,
+        felt: Felt | None = None,
     ) -> None:
         if collision is not None and not all(0.0 < most < np.inf for most in collision):
             raise InputError(f"collision thresholds must be above 0, got {collision}")
         self._library = _import_pylibfranka()
         self._host, self._real_time, self._collision = host, real_time, collision
+        self._felt = felt
         self._robot: Any = None
         self._control: Any = None
 
@@ -82,8 +95,11 @@ class FrankaDriver:
         del timeout
         with self._told():
             state, _ = self._control.readOnce()
+        q, wrenches = np.array(state.q), None
+        if self._felt is not None:
+            wrenches = self._felt(q, np.array(state.tau_ext_hat_filtered))
         return RobotState(
-            state.time.to_sec(), np.array(state.q), np.array(state.dq), np.array(state.tau_J_d)
+            state.time.to_sec(), q, np.array(state.dq), np.array(state.tau_J_d), wrenches
         )
 
     def write(self, tau: np.ndarray) -> None:

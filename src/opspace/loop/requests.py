@@ -18,7 +18,7 @@ from opspace.contacts import GroundContact
 from opspace.controller import ReferenceController
 from opspace.errors import InputError, OpspaceError, RecordingError, unknown_name
 from opspace.law import Profile
-from opspace.tasks import Task
+from opspace.tasks import ForceTask, ImpedanceTask, Task
 from opspace.tasks.leading import lead
 from opspace.tasks.validation import finite, finite_array
 
@@ -30,6 +30,8 @@ KINDS: Mapping[str, frozenset[str]] = MappingProxyType(
         "swap": frozenset({"duration"}),
         "lead": frozenset({"position", "orientation"}),
         "gain": frozenset({"kp", "duration"}),
+        "spring": frozenset({"stiffness", "duration"}),
+        "press": frozenset({"force"}),
         "place": frozenset({"obstacle", "position"}),
     }
 )
@@ -38,7 +40,15 @@ KINDS: Mapping[str, frozenset[str]] = MappingProxyType(
 FILE = "requests.jsonl"
 """Name of the file beside a recording that tells what was asked for during the run."""
 
-_NEEDED = {"move": ("level",), "gain": ("kp",), "place": ("obstacle", "position")}
+_NEEDED = {
+    "move": ("level",),
+    "gain": ("kp",),
+    "spring": ("stiffness",),
+    "press": ("force",),
+    "place": ("obstacle", "position"),
+}
+_AGAIN = ("lead", "gain", "spring", "press", "place")
+"""What a later one of the same kind replaces."""
 _TASKS = {"swap": 2, "place": 0}
 
 
@@ -50,10 +60,12 @@ class RunRequest:
         kind: One of `KINDS`.
         tasks: Name of the task or contact, or of the two tasks that swap.
         level: Number of the level, for move and for insert of a task; contacts have none.
-        duration: How long it takes, s; not for lead, which takes as long as its way.
+        duration: How long it takes, s; not for lead and press, which have speeds of their own.
         position: (3,) where to lead to, m.
         orientation: Quaternion wxyz to lead to.
         kp: Stiffness to come to, 1/s².
+        stiffness: Stiffness that an `opspace.ImpedanceTask` comes to, N/m and N·m/rad, one per row.
+        force: Force that an `opspace.ForceTask` comes to, N, one per axis.
         obstacle: Name of the obstacle to lead to a position; then there is no task.
         wait: Of a contact to remove, see `opspace.Stack.remove`.
 
@@ -71,6 +83,8 @@ class RunRequest:
     kp: float | None = None
     wait: bool | None = None
     obstacle: str | None = None
+    stiffness: tuple[float, ...] | None = None
+    force: tuple[float, ...] | None = None
 
     @property
     def about(self) -> str:
@@ -114,6 +128,14 @@ class RunRequest:
             if value is not None:
                 found = finite_array(value, (size,), f"{what} {name}")
                 object.__setattr__(self, name, tuple(found.tolist()))
+        # As long as the task says, which sees them when they are applied.
+        for name in ("stiffness", "force"):
+            value = getattr(self, name)
+            if value is not None:
+                if not isinstance(value, tuple):
+                    raise InputError(f"{what} {name} must be a list of numbers, not {value!r}")
+                each = tuple(_number(one, f"{what} {name}") for one in value)
+                object.__setattr__(self, name, each)
 
     @classmethod
     def read(cls, content: Mapping[str, Any]) -> RunRequest:
@@ -147,7 +169,7 @@ class RunRequest:
     def replaces(self, other: RunRequest) -> bool:
         """Whether nothing of another request is left when this one is done."""
         mine = self.kind, self.tasks, self.obstacle
-        if self.kind not in ("lead", "gain", "place") or mine != (
+        if self.kind not in _AGAIN or mine != (
             other.kind,
             other.tasks,
             other.obstacle,
@@ -164,10 +186,19 @@ class RunRequest:
 
 @dataclass(frozen=True)
 class _GainRamp:
-    """A stiffness on its way; a step in it would be a step in the torque."""
+    """A stiffness on its way; a step in it would be a step in the torque.
 
+    Attributes:
+        gain: What it is called in its task.
+        start: Where it was.
+        goal: Where it comes to.
+        begin: When it began, s.
+        duration: How long it takes, s.
+    """
+
+    gain: str
     start: Any
-    goal: float
+    goal: Any
     begin: float
     duration: float
 
@@ -244,9 +275,14 @@ class Changes:
             case "lead":
                 place = {"position": request.position, "orientation": request.orientation}
                 lead(task, self._controller.robot, t, **place)
+            case "press":
+                self._press(task, request)
+            case "spring":
+                if not isinstance(task, ImpedanceTask):
+                    raise InputError(f"task {task.name!r} has no spring: it is no ImpedanceTask")
+                self._change_gain(task, "stiffness", np.array(request.stiffness), t, duration)
             case _:
-                assert request.kp is not None
-                self._change_gain(task, request.kp, t, duration)
+                self._change_gain(task, "kp", request.kp, t, duration)
 
     @property
     def moving(self) -> bool:
@@ -272,16 +308,23 @@ class Changes:
     def follow(self, t: float) -> None:
         """Move on what takes time: the gains on their way at time ``t`` [s]."""
         for name, ramp in list(self._ramps.items()):
-            self._tasks[name].kp = ramp.at(t)
+            setattr(self._tasks[name], ramp.gain, ramp.at(t))
             if ramp.over(t):
                 del self._ramps[name]
 
-    def _change_gain(self, task: Task, kp: float, t: float, duration: float) -> None:
-        start = task.kp
+    def _change_gain(self, task: Task, gain: str, goal: Any, t: float, duration: float) -> None:
+        start = getattr(task, gain)
         # Refused now, if at all: between two ticks nobody sees it.
-        task.kp = kp
-        task.kp = start
-        self._ramps[task.name] = _GainRamp(start, kp, t, duration)
+        setattr(task, gain, goal)
+        setattr(task, gain, start)
+        self._ramps[task.name] = _GainRamp(gain, start, goal, t, duration)
+
+    @staticmethod
+    def _press(task: Task, request: RunRequest) -> None:
+        """Let a force task go to another force, as fast as its ``force_rate`` lets it."""
+        if not isinstance(task, ForceTask):
+            raise InputError(f"task {task.name!r} presses with no force: it is no ForceTask")
+        task.force = np.array(request.force)
 
     def _place(self, request: RunRequest, t: float) -> None:
         guard = self._controller.collisions

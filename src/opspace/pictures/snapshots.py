@@ -22,6 +22,7 @@ from opspace.pictures.offscreen import (
     canvas,
     fit_view,
 )
+from opspace.pictures.touched_drawn import TouchedDrawn
 from opspace.record import Recording
 from opspace.robots.adapter import spread_of
 from opspace.robots.protocol import Robot
@@ -53,6 +54,7 @@ _TRAIL_POINTS = 60
 
 
 class _Tick(NamedTuple):
+    row: int
     qpos: np.ndarray
     target: np.ndarray | None
     trail: np.ndarray
@@ -70,7 +72,8 @@ def snapshots(
 ) -> list[np.ndarray]:
     """Render the robot at several times of a run, all from the same place.
 
-    The desired position is a sphere, the way of the tool so far a line; obstacles are where they were.
+    The desired position is a sphere, the way of the tool so far a line; obstacles are where they were,
+    what the tool presses is a disc and the force on it that was measured an arrow.
 
     Args:
         recording: The run, with columns ``q/<joint>`` and ``tool/x`` to ``tool/z``.
@@ -134,12 +137,13 @@ def render(
     model.vis.map.shadowclip, model.vis.quality.shadowsize = 4.0, shadow_map
     data = mujoco.MjData(model)
     ticks = _ticks(model, robot, recording, times, task)
-    view = _choose_view(model, data, ticks, size, direction)
+    view, touched = _choose_view(model, data, ticks, size, direction), TouchedDrawn(recording)
     with canvas(model, size) as drawing:
         for tick in ticks:
             data.qpos[:] = tick.qpos
             mujoco.mj_forward(model, data)
             _draw(drawing, data, tick, view)
+            touched.draw(drawing, tick.row, tick.trail[-1])
             yield drawing.pixels()
 
 
@@ -216,7 +220,7 @@ def _ticks(
             qpos = spread.positions(np.array([found[f"q/{name}"] for name in robot.joint_names]))
         target = tool[row] + [found[name] for name in error] if aimed else None
         shown = np.linspace(0, row, min(row + 1, _TRAIL_POINTS)).astype(int)
-        ticks.append(_Tick(qpos, target, tool[shown], drawn.at(row)))
+        ticks.append(_Tick(row, qpos, target, tool[shown], drawn.at(row)))
     return ticks
 
 

@@ -16,6 +16,7 @@ COLORS = {
     "contact": style.VARIANT_COLORS["transition"],
     "alone": "#66B5E0",
     "switch": style.VARIANT_COLORS["switch"],
+    "sai": "#AA4499",
     "impedance": style.VARIANT_COLORS["without"],
 }
 
@@ -41,7 +42,7 @@ def touch_figure(
             "color": COLORS[name],
             "linewidth": style.LINE,
             "label": titles[name],
-            "zorder": 2.0 if name == "switch" else 2.5,
+            "zorder": 2.0 if name in ("switch", "sai") else 2.5,
         }
         there = (run["t"] >= -BEFORE) & (run["t"] <= AFTER)
         t = 1e3 * run["t"][there]

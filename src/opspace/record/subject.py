@@ -11,12 +11,13 @@ from opspace.contacts import GroundContact
 from opspace.controller import ReferenceController
 from opspace.record.contact_columns import GROUP, subject_of_contact
 from opspace.record.obstacle_columns import HEADER_KEY, about_collisions
+from opspace.record.wrench_columns import subject_of_touch
 from opspace.robots.adapter import added_frames, held_joints
 from opspace.robots.catalogue import CATALOGUE, locate
 from opspace.robots.joint_units import joint_units
 from opspace.robots.motor_range import motor_range
 from opspace.robots.protocol import Robot
-from opspace.tasks import Task
+from opspace.tasks import ForceTask, ImpedanceTask, Task
 from opspace.tasks.leading import can_be_led
 from opspace.tasks.motion_task import MotionTask
 from opspace.tasks.motions import CenterOfMass, WorldFrame
@@ -38,10 +39,11 @@ def subject_of(
     Returns:
         ``robot`` (name or file, joints, their units and limits in rad or m, torque limits, the buffer
         before a limit in rad or m, and by limit the acceleration that its joint brakes with; null
-        where there is none), ``tasks`` (units, stiffness, level, and what its target can be led
-        to), ``contacts`` (frame, offset in m, friction, half the sides of a sole in m, normal of a
-        point), which only robots with a floating base have, and ``collisions``, see
-        `opspace.record.obstacle_columns.about_collisions`, where something is kept apart.
+        where there is none), ``tasks`` (units, stiffness, level, what its target can be led to, and
+        where and with what a force task presses), ``contacts`` (frame, offset in m, friction, half
+        the sides of a sole in m, normal of a point), which only robots with a floating base have,
+        and ``collisions``, see `opspace.record.obstacle_columns.about_collisions`, where something
+        is kept apart.
     """
     stack = controller.stack
     found = {
@@ -101,6 +103,8 @@ def _task(task: Task, level: float | None) -> dict[str, Any]:
         "level": level,
         "led_by": _led_by(task),
         **(_place(task) if can_be_led(task) else {}),
+        **({"press": subject_of_touch(task)} if isinstance(task, ForceTask) else {}),
+        **({"stiffness": task.stiffness.tolist()} if isinstance(task, ImpedanceTask) else {}),
     }
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -18,12 +18,28 @@ PARTS = {"x": "N", "y": "N", "z": "N", "rx": "N·m", "ry": "N·m", "rz": "N·m"}
 Given: TypeAlias = Mapping[str, "np.ndarray | None"]
 """Wrenches of a tick by name of the frame, as a controller has been given them."""
 
+RECENT = 10
+"""A wrench that none of so many ticks has brought is not shown any more."""
+
 _NOTHING = np.full(len(PARTS), np.nan)
 
 
 def sensors_of(tasks: Sequence[Task]) -> tuple[str, ...]:
     """List the frames whose wrenches some prepared tasks need."""
     return tuple(dict.fromkeys(task.sensor for task in tasks if isinstance(task, ForceTask)))
+
+
+def subject_of_touch(task: ForceTask) -> dict[str, Any]:
+    """Describe where and with what a force task presses in JSON's own types."""
+    source = task.source
+    return {
+        "sensor": task.sensor,
+        "offset": None if source.offset is None else source.offset.tolist(),
+        "selection": task.selection.tolist(),
+        "in_tool_axes": task.in_tool_axes,
+        "force": task.force.tolist(),
+        "least": task.thresholds[1],
+    }
 
 
 def columns_of_wrenches(sensors: Sequence[str]) -> list[Column]:
@@ -70,6 +86,18 @@ def row_of_touches(tasks: Sequence[Task]) -> list[np.ndarray]:
             else:
                 parts += [np.array([touch.confidence]), touch.measured, touch.commanded]
     return parts
+
+
+def latest(wrenches: np.ndarray, row: int) -> np.ndarray:
+    """Give what was measured last up to a tick; NaN where `RECENT` ticks have brought nothing.
+
+    Args:
+        wrenches: (ticks, k) NaN where nothing new was measured.
+        row: The tick.
+    """
+    recent = wrenches[max(row + 1 - RECENT, 0) : row + 1]
+    known = recent[~np.isnan(recent).any(axis=1)]
+    return known[-1] if len(known) else np.full(wrenches.shape[1], np.nan)
 
 
 def recorded_wrenches(recording: Recording) -> list[Given | None]:

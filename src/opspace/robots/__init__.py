@@ -1,5 +1,6 @@
 """Robots behind one protocol, on Pinocchio or MuJoCo."""
 
+from opspace.robots.joint_torque_sensor import JointTorqueSensor as JointTorqueSensor
 from opspace.robots.payload import Payload as Payload
 from opspace.robots.protocol import Robot as Robot
 from opspace.robots.registry import RobotInfo as RobotInfo

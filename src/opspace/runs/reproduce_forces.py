@@ -26,11 +26,14 @@ TITLES: Mapping[str, str] = MappingProxyType(
         "contact": "force task by contact",
         "alone": "force task alone",
         "switch": "hard switch",
+        "sai": "hard switch, gains of SAI",
         "impedance": "impedance, table known",
         "rough arm": "force task alone, masses and friction off",
     }
 )
 """What the ways are called."""
+SAI = MappingProxyType({"kp": 0.7, "ki": 1.3, "kv": 10.0, "friction": False})
+"""Default gains of the force control of SAI primitives, without its observer of passivity."""
 STIFFNESSES = (3e2, 1e3, 3e3, 1e4, 3e4, 1e5, 3e5, 1e6)
 """Of the sweep, N/m."""
 CIRCLE_AT = 1.5
@@ -139,10 +142,12 @@ def ways(robot: str, stiffness: float = 1e5) -> dict[str, Scenario]:
         "down": {**spring, "target": known},
         "posture": {**tasks["posture"], "level": 4},
     }
+    like_sai = {**by_contact, "press": {**by_contact["press"], **SAI}}
     found = {
         "contact": {**base, "tasks": by_contact},
         "alone": base,
         "switch": {**base, "tasks": by_contact, "method": "switch"},
+        "sai": {**base, "tasks": like_sai, "method": "switch"},
         "impedance": {**base, "tasks": sprung},
         "rough arm": {
             **base,

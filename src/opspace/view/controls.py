@@ -123,6 +123,7 @@ class StackControls:
         self._other = server.gui.add_dropdown("Swap with", names, initial_value=second)
         swap = server.gui.add_button("Swap")
         self._kp = server.gui.add_slider("kp [1/s²]", 0.0, KP_MOST, 1.0, self._stiffness(first))
+        self._kp.disabled = not self._has_gain(first)
         self._answer = server.gui.add_html(answer("", ""))
         once.on_click(lambda event: self._change(event.target.value.lower()))
         swap.on_click(lambda event: self._swap())
@@ -155,9 +156,14 @@ class StackControls:
         del event
         self._level.value = self._home(self._task.value)
         self._kp.value = self._stiffness(self._task.value)
+        self._kp.disabled = not self._has_gain(self._task.value)
 
     def _home(self, name: str) -> float:
         return self._homes.get(name, 0.0)
+
+    def _has_gain(self, name: str) -> bool:
+        """Tell whether kp is the stiffness of a task: not of those that press, nor of springs."""
+        return not {"press", "stiffness"} & self._tasks[name].keys()
 
     def _stiffness(self, name: str) -> float:
         kp = self._tasks[name]["kp"]

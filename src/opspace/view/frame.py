@@ -13,6 +13,8 @@ from opspace.record.contact_columns import GROUP as CONTACTS
 from opspace.record.growing import GrowingRecording
 from opspace.record.obstacle_columns import GROUP as OBSTACLES
 from opspace.record.obstacle_columns import HEADER_KEY, PARTS, placing_of
+from opspace.record.wrench_columns import GROUP as WRENCHES
+from opspace.record.wrench_columns import RECENT, latest
 from opspace.tasks.obstacles import Placing
 
 
@@ -78,6 +80,27 @@ class ContactFrame:
     cone_use: float
 
 
+@dataclass(frozen=True)
+class TouchFrame:
+    """What a force task knows of its contact at one tick; nan while it is not in the stack.
+
+    Attributes:
+        name: Name of the task.
+        activation: Of the task.
+        confidence: How sure it is that something is touched, 0 to 1.
+        wanted: (m,) force and moment that is wanted along its rows, N and N·m.
+        commanded: (m,) the same with feedback.
+        wrench: (3,) force on the environment that was measured last, in world axes, N.
+    """
+
+    name: str
+    activation: float
+    confidence: float
+    wanted: np.ndarray
+    commanded: np.ndarray
+    wrench: np.ndarray
+
+
 _NOWHERE = np.full(3, np.nan)
 
 
@@ -97,6 +120,7 @@ class Frame:
         obstacles: Where obstacles are, by name, those that are there.
         contacts: The contacts.
         com: (3,) centre of mass, m; nan for robots that are bolted down.
+        touches: What force tasks touch.
     """
 
     t: float
@@ -110,6 +134,7 @@ class Frame:
     obstacles: Mapping[str, Placing] = field(default_factory=dict[str, Placing])
     contacts: tuple[ContactFrame, ...] = ()
     com: np.ndarray = field(default_factory=lambda: _NOWHERE)
+    touches: tuple[TouchFrame, ...] = ()
 
 
 class FrameReader:
@@ -143,6 +168,11 @@ class FrameReader:
         self._levels = {float(name): self._level(name) for name in _levels(recording)}
         self._contacts = {name: self._contact(name) for name in recording.header.get(CONTACTS, {})}
         self._com = recording.columns(recording.group("com"))
+        self._touches = {
+            name: self._touch(name, about["press"]["sensor"])
+            for name, about in recording.header["tasks"].items()
+            if "press" in about
+        }
 
     @property
     def joints(self) -> list[str]:
@@ -184,6 +214,7 @@ class FrameReader:
                 _contact_frame(name, values, places) for name, places in self._contacts.items()
             ),
             com=values[self._com] if self._com else _NOWHERE,
+            touches=tuple(self._touch_frame(name, row, values) for name in self._touches),
         )
 
     def row_at(self, t: float) -> int:
@@ -226,6 +257,30 @@ class FrameReader:
             }
         )
         return found
+
+    def _touch(self, name: str, sensor: str) -> dict[str, list[int]]:
+        recording, where = self.recording, f"touch/{name}"
+        found = {
+            part: recording.columns(recording.group(f"{where}/{part}"))
+            for part in ("measured", "commanded")
+        }
+        found["confidence"] = recording.columns([f"{where}/confidence"])
+        found["wrench"] = recording.columns([f"{WRENCHES}/{sensor}/{axis}" for axis in "xyz"])
+        return found
+
+    def _touch_frame(self, name: str, row: int, values: np.ndarray) -> TouchFrame:
+        places, (h, _, error) = self._touches[name], self._tasks[name]
+        # The memory of a task that has left the stack stays as it was.
+        there = 0.0 if math.isfinite(values[h]) else math.nan
+        recent = self.recording.data[max(row + 1 - RECENT, 0) : row + 1, places["wrench"]]
+        return TouchFrame(
+            name,
+            float(values[h]),
+            float(values[places["confidence"][0]]) + there,
+            values[error] + values[places["measured"]],
+            values[places["commanded"]] + there,
+            latest(recent, len(recent) - 1),
+        )
 
     def _level(self, number: str) -> tuple[list[int], list[int], list[int]]:
         recording, prefix = self.recording, f"levels/{number}"

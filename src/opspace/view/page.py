@@ -30,7 +30,10 @@ from opspace.view.contact_scene import ContactScene
 from opspace.view.controls import Ask, ContactControls, RunControls, StackControls
 from opspace.view.distance_panel import distances
 from opspace.view.frame import FrameReader
+from opspace.view.press_controls import PressControls, has_pressure
 from opspace.view.scene import RobotScene
+from opspace.view.touch_panel import touches
+from opspace.view.touch_scene import TouchScene
 
 PICTURES = 25.0
 """Pictures per second."""
@@ -84,6 +87,12 @@ class Page:
         )
         touching = self._about.get(GROUP, {})
         self._contacts = ContactScene(self._server, robot, touching) if touching else None
+        self._presses = {
+            n: one["press"] for n, one in self._about["tasks"].items() if "press" in one
+        }
+        self._touches: TouchScene | None = None
+        if self._presses:
+            self._touches = TouchScene(self._server, robot, self._presses, _touched(self._about))
         self._ask = ask
         self._charted = self._drawn = 0.0
         self._shown: tuple[int, bool] | None = None
@@ -153,8 +162,11 @@ class Page:
             self._distances.content = distances(gaps, self._apart.margin)
         if self._contacts is not None:
             self._contacts.show(frame)
+        if self._touches is not None:
+            self._touches.show(frame)
         self._head.content = panels.head(frame, self._note(live))
-        self._bars.content = panels.contacts(frame) + panels.tasks(frame)
+        pressed = touches(frame, self._presses)
+        self._bars.content = panels.contacts(frame) + pressed + panels.tasks(frame)
         if now - self._charted >= 1.0 / CHARTS or self._run.paused:
             self._charted = now
             self._joints.content = panels.joints(frame, self._reader.joints, self._about["robot"])
@@ -188,6 +200,9 @@ class Page:
             if ask is not None and self._about.get(GROUP):
                 gui.add_divider()
                 ContactControls(self._server, ask, list(self._about[GROUP]))
+            if ask is not None and has_pressure(self._about["tasks"]):
+                gui.add_divider()
+                PressControls(self._server, ask, self._about["tasks"])
         with tabs.add_tab("Joints"):
             self._joints = gui.add_html("")
         if HEADER_KEY in self._about:
@@ -249,6 +264,12 @@ def _check_host(host: str) -> None:
         socket.create_server((host, 0)).close()
     except OSError as error:
         raise InputError(f"no page can be opened at the address {host!r}: {error}") from None
+
+
+def _touched(about: dict[str, Any]) -> list[dict[str, Any]]:
+    """List what the tool may touch, where a scenario says so: surfaces and holes."""
+    plant = about.get("scenario", {}).get("plant", {})
+    return [*plant.get("surfaces", ()), *plant.get("holes", ())]
 
 
 def _homes(about: dict[str, Any]) -> dict[str, float]:
