@@ -198,11 +198,12 @@ def test_a_push_from_the_front_costs_no_more_than_heels_and_a_swing_can_help():
 @pytest.mark.parametrize(
     ("robot", "impulse", "axis"),
     [
-        ("g1", 14.0, 0),
-        ("g1", 20.0, 1),
-        ("talos", 32.0, 0),
-        ("talos", -32.0, 0),
-        ("talos", 40.0, 1),
+        ("g1", 16.0, 0),
+        ("g1", -11.0, 0),
+        ("g1", 22.0, 1),
+        ("talos", 37.0, 0),
+        ("talos", -37.0, 0),
+        ("talos", 50.0, 1),
     ],
 )
 def test_as_much_as_feet_can_take_is_taken(robot, impulse, axis):
