@@ -254,7 +254,7 @@ def test_contacts_and_tasks_are_asked_for_from_any_thread():
     assert stack.settled
     assert all(told.progress == 1.0 for told in show.command.contacts.values())
     assert len(show.command.contacts) == len(show.contacts)
-    assert abs(show.command.tasks["hand"].activation - 1.0) < 1e-9
+    assert show.command.tasks["hand"].activation == 1.0
 
 
 @pytest.mark.slow

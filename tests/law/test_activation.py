@@ -1,5 +1,7 @@
 """Profiles, buffers and ramps: derivatives, ends, and changes of mind without a step."""
 
+import math
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -164,6 +166,29 @@ def test_no_duration_is_too_long_or_too_short(changes, name):
         assert np.all(np.isfinite(new.numbers))
         assert np.all(np.isfinite(new(t)))
         ramp = new
+
+
+@MANY
+@given(
+    st.floats(0.0, 1e6),
+    st.floats(1e-3, 1e3),
+    st.floats(0.0, 1.0),
+    st.floats(1e-3, 10.0),
+    st.sampled_from([0.0, 1.0]),
+    st.sampled_from(PROFILES),
+)
+def test_a_ramp_that_has_finished_is_at_its_target_exactly(
+    start, first, fraction, second, target, name
+):
+    """The sum of two times is rounded: what says that it is over and what it is must round alike."""
+    up = Ramp.resting(0.0, name).towards(1.0, first, start)
+    for ramp in (up, up.towards(target, second, start + fraction * first)):
+        end = ramp.start_time + ramp.duration
+        for t in (math.nextafter(end, -math.inf), end, math.nextafter(end, math.inf)):
+            assert 0.0 <= ramp(t).value <= 1.0
+            if ramp.finished(t):
+                assert ramp(t) == (ramp.target, 0.0, 0.0)
+        assert ramp.finished(end)
 
 
 def test_zero_duration_is_a_hard_switch():

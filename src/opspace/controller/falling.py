@@ -29,8 +29,10 @@ class FallRule:
     centre of mass has not become slower, nor what is given up less. A robot that takes back a push is
     not balanced for much longer than the push, but first it slows down, then it comes back, and what its
     tasks want comes into reach. It falls as well when the base has turned away from upright, which is
-    how it stands in the robot's reference posture, by more than ``tilt``. From then on no task is
-    followed: the joints are damped until `opspace.Controller.restart`.
+    how it stands in the robot's reference posture, by more than ``tilt``: a law that believes in a
+    contact which is not there sees no reason to give anything up. A body that swings to take back a
+    push turns far as well, and comes back. From then on no task is followed: the joints are damped
+    until `opspace.Controller.restart`.
 
     Attributes:
         after: How long the robot may be not balanced without getting better, s. A push is over
@@ -42,7 +44,7 @@ class FallRule:
     """
 
     after: float = 0.2
-    tilt: float = 0.8
+    tilt: float = 1.4
 
     def __post_init__(self) -> None:
         for what in ("after", "tilt"):

@@ -130,7 +130,8 @@ class Ramp(NamedTuple):
 
         Args:
             target: 0.0 or 1.0.
-            duration: Time to get there, s; less than a nanosecond is a hard switch.
+            duration: Time to get there, s; less than a nanosecond, or than the clock resolves at
+                this time, is a hard switch.
             t: Time of the request, s.
 
         Returns:
@@ -144,7 +145,7 @@ class Ramp(NamedTuple):
             raise InputError(f"the duration of a ramp must be finite and >= 0 s, got {duration}")
         if not math.isfinite(t):
             raise InputError(f"the time of a ramp must be finite, got {t}")
-        if duration < _INSTANT:
+        if duration < _INSTANT or t + duration == t:
             return Ramp(self.profile, target, t, 0.0, target, 0.0, 0.0, 0.0, 0.0)
         s, rate, acceleration = ramp_phase(t, *self.numbers)
         if not 0.0 < s < 1.0:

@@ -106,9 +106,9 @@ def ramp_phase(
     The rate of s is led by a cubic Hermite segment of this width from (rate, acceleration) to
     (cruise, 0), and stays there until the ramp arrives.
     """
-    tau = max(t - start_time, 0.0)
-    if tau >= duration:
+    if t >= start_time + duration:  # the time that requests and `settled` go by, to the last bit
         return target, 0.0, 0.0
+    tau = max(t - start_time, 0.0)
     if tau >= width:
         covered = width * ((rate + cruise) / 2.0 + width * acceleration / 12.0)
         return phase + covered + cruise * (tau - width), cruise, 0.0

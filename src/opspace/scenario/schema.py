@@ -9,6 +9,7 @@ from pydantic import Field, PrivateAttr, ValidationInfo, field_validator, model_
 
 from opspace.errors import ScenarioError
 from opspace.law.scalars import LIMIT_LAWS
+from opspace.plan.scales import STANDING_SINGULARITY
 from opspace.scenario.contact_entries import AnyContact, GroundEntry
 from opspace.scenario.document import Document, Key, key_text
 from opspace.scenario.events import Event, ProfileName, check_events
@@ -161,7 +162,7 @@ class FallingEntry(Entry):
         default=0.2, description="how long it may be not balanced without getting better [s]"
     )
     tilt: Annotated[float, Number("rad", above=0.0)] = Field(
-        default=0.8, description="how far its base may turn from where it was upright [rad]"
+        default=1.4, description="how far its base may turn from where it was upright [rad]"
     )
 
 
@@ -273,8 +274,8 @@ class Scenario(Entry):
     )
     singularity: SingularityEntry | None = Field(
         default_factory=SingularityEntry,
-        description="singularity avoidance; null is none, which a robot on contacts has where "
-        "nothing is said",
+        description="singularity avoidance; null is none, and a robot on contacts has a narrower "
+        "buffer where nothing is said, 0.003 to 0.03",
     )
     plant: PlantEntry = Field(default_factory=PlantEntry, description="the simulated robot")
     stop: StopEntry = Field(default_factory=StopEntry, description="when a run is given up")
@@ -288,10 +289,11 @@ class Scenario(Entry):
 
     @model_validator(mode="before")
     @classmethod
-    def _no_buffer_on_contacts(cls, data: Any) -> Any:
-        # What is usual in flight says nothing about a robot that stands.
+    def _narrow_buffer_on_contacts(cls, data: Any) -> Any:
+        # What is usual in flight is much more than a robot has that stands.
         if isinstance(data, dict) and data.get("contacts"):
-            return {"singularity": None, **data}
+            narrow = {"lower": STANDING_SINGULARITY.lower, "upper": STANDING_SINGULARITY.upper}
+            return {"singularity": narrow, **data}
         return data
 
     @field_validator("tasks")
