@@ -41,8 +41,8 @@ class Status(IntFlag):
     COLLISION = 4096
     """A pair of bodies is kept from coming nearer: tasks get less than they ask for."""
     COLLISION_LOST = 8192
-    """No torque of the motors keeps a pair of bodies from soon closing faster than it can be stopped; the
-    excess is as small as can be."""
+    """No torque of the motors keeps a pair of bodies from soon closing faster than it can be stopped;
+    the excess is as small as can be."""
     GIVEN_UP = 16384
     """Contacts, motors or joints do not allow what the tasks want, and more than a thousandth of the
     weight was given up."""
