@@ -3,10 +3,8 @@
 ``python docs/evidence/pushes.py --pushes 1000`` draws pushes of 4 to 16 N·s from any side, at the
 pelvis or at the torso, within 0.05 to 0.2 s, gives each to both and writes ``pushes.csv`` and the table
 of docs/safety.md. The weighted program has the limits, cones and contacts of the other, weights of 10
-to 1 from level to level in place of priorities, and takes some seconds for a push. So it gets those
-that this law has lost first, then the others, from the one that moved the centre of mass furthest;
-``--beside 160`` stops after so many. A push is its number: ``--first 40 --pushes 1`` is the fortieth
-again, and what the file has already is not repeated.
+to 1 from level to level in place of priorities, and takes some seconds for a push. A push is its number:
+``--first 40 --pushes 1`` is the fortieth again, and what the file has already is not repeated.
 """
 
 from __future__ import annotations
@@ -14,8 +12,7 @@ from __future__ import annotations
 import argparse
 import sys
 from functools import partial
-from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from buffer_document import DOCS, EVIDENCE, number, read_csv, replace_block, write_csv
@@ -40,26 +37,31 @@ CLASSES = ((4.0, 8.0), (8.0, 12.0), (12.0, 16.0))
 """Impulses of one row of the table, N·s."""
 
 
-FOUND = ("{}", "{}_step", "{}_com")
-"""Columns of a law: whether the robot stands, its largest torque step after the push until it stood or
-fell [N·m per tick], and the largest error of its centre of mass [m]. Empty where it was not run."""
-COLUMNS = ("number", "impulse", "angle", "duration", "frame")
+class Found(NamedTuple):
+    """What became of a push under both laws.
 
+    ``step`` is the largest torque step after it until the robot stood or fell, N·m per tick; ``com``
+    the largest error of the centre of mass, m.
+    """
 
-class Push(NamedTuple):
-    """Impulse [N·s], direction [rad], duration [s] and frame of a push."""
-
+    number: int
     impulse: float
     angle: float
     duration: float
     frame: str
+    ours: bool
+    weighted: bool
+    ours_step: float
+    weighted_step: float
+    ours_com: float
+    weighted_com: float
 
 
-def draw(which: int) -> Push:
-    """Draw the push with this number."""
+def draw(which: int) -> tuple[float, float, float, str]:
+    """Impulse [N·s], direction [rad], duration [s] and frame of a push."""
     rng = np.random.default_rng([2026, which])
     impulse, angle = rng.uniform(CLASSES[0][0], CLASSES[-1][1]), rng.uniform(-np.pi, np.pi)
-    return Push(impulse, angle, rng.uniform(0.05, 0.2), str(rng.choice(["pelvis", "torso_link"])))
+    return impulse, angle, rng.uniform(0.05, 0.2), str(rng.choice(["pelvis", "torso_link"]))
 
 
 def stand_and_be_pushed(which: int, law: str) -> tuple[bool, float, float]:
@@ -102,60 +104,31 @@ def watch(
     return off < 0.01, largest, error
 
 
-Rows = dict[int, dict[str, Any]]
-"""What is known of every push, by its number."""
+def one_push(which: int) -> Found:
+    """Give one push to both."""
+    (ours, a_step, a_com), (weighted, b_step, b_com) = (
+        stand_and_be_pushed(which, law) for law in LAWS
+    )
+    return Found(which, *draw(which), ours, weighted, a_step, b_step, a_com, b_com)
 
 
-def known(path: Path) -> Rows:
-    """Read what was found."""
-    return {int(row["number"]): dict(row) for row in read_csv(path)} if path.exists() else {}
-
-
-def find(rows: Rows, which: int, law: str) -> None:
-    """Give a push to a law, unless it has had it, and write what came of it."""
-    if which not in rows:
-        empty = [name.format(law) for name in FOUND for law in LAWS]
-        rows[which] = {
-            **dict(zip(COLUMNS, (which, *draw(which)), strict=True)),
-            **dict.fromkeys(empty, ""),
-        }
-    row = rows[which]
-    if row[law]:
-        return
-    found = stand_and_be_pushed(which, law)
-    row.update(zip((name.format(law) for name in FOUND), (str(found[0]), *found[1:]), strict=True))
-    print(which, law, found, file=sys.stderr, flush=True)
-    write_csv(CSV, [rows[n] for n in sorted(rows)])
-
-
-def stood(row: dict[str, Any], law: str) -> bool:
-    """Tell whether the robot stands after a push."""
-    return row[law] == "True"
-
-
-def table(rows: Rows) -> str:
-    """Write what became of the pushes, one row of the table for each class of impulses.
-
-    Whatever the weighted program has not been given counts as taken back by it: those that only it takes
-    back are all there are, and those that only this law takes back at least so many.
-    """
-    head = ["impulse [N·s]", "pushes", "opspace stands", "only weighted", "only opspace, at least"]
-    head += ["step, median", "99 %", "centre of mass, median [mm]"]
+def table(rows: list[dict[str, str]]) -> str:
+    """Write what became of the pushes, one row of the table for each class of impulses."""
+    head = ["impulse [N·s]", "pushes", "both stand", "only opspace", "only weighted"]
+    head += ["step, median", "99 %", "weighted, median", "99 %"]
     lines = []
     for low, high in (*CLASSES, (CLASSES[0][0], CLASSES[-1][1])):
-        inside = [row for row in rows.values() if low <= float(row["impulse"]) < high]
-        stand = [row for row in inside if stood(row, "ours")]
-        steps = [float(row["ours_step"]) for row in stand]
-        ways = [1e3 * float(row["ours_com"]) for row in stand]
-        counts = [
-            len(inside),
-            len(stand),
-            sum(stood(row, "weighted") and not stood(row, "ours") for row in inside),
-            sum(row["weighted"] == "False" for row in stand),
+        inside = [row for row in rows if low <= float(row["impulse"]) < high]
+        stood = [(row["ours"] == "True", row["weighted"] == "True") for row in inside]
+        both = [row for row, s in zip(inside, stood, strict=True) if all(s)]
+        counts = [stood.count(s) for s in ((True, True), (True, False), (False, True))]
+        steps = [
+            number(np.quantile([float(row[f"{law}_step"]) for row in both], part)) if both else "–"
+            for law in LAWS
+            for part in (0.5, 0.99)
         ]
-        measured = [np.median(steps), np.quantile(steps, 0.99), np.median(ways)]
         name = f"{low:.0f} to {high:.0f}"
-        lines.append([name, *(f"{count}" for count in counts), *map(number, measured)])
+        lines.append([name, f"{len(inside)}", *(f"{count}" for count in counts), *steps])
     return markdown_table(head, lines)
 
 
@@ -164,21 +137,19 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("--pushes", type=int, default=1000, help="how many there are to be")
     parser.add_argument("--first", type=int, default=0, help="number of the first")
-    parser.add_argument("--beside", type=int, help="how many of the hardest both laws are given")
     parser.add_argument("--draw", action="store_true", help="only write the table anew")
     asked = parser.parse_args()
-    rows = known(CSV)
-    numbers = [] if asked.draw else range(asked.first, asked.first + asked.pushes)
-    for which in numbers:
-        find(rows, which, "ours")
-    for which in numbers:
-        if not stood(rows[which], "ours"):
-            find(rows, which, "weighted")
-    hardest = sorted(numbers, key=lambda n: -float(rows[n]["ours_com"]))
-    for which in hardest[: asked.beside]:
-        find(rows, which, "weighted")
+    rows = read_csv(CSV) if CSV.exists() else []
+    known = {int(row["number"]) for row in rows}
+    missing = [n for n in range(asked.first, asked.first + asked.pushes) if n not in known]
+    for which in [] if asked.draw else missing:
+        found = one_push(which)
+        print(found, file=sys.stderr, flush=True)
+        rows.append(found._asdict())
+        write_csv(CSV, rows)
+        rows = read_csv(CSV)
     if rows:
-        replace_block(DOCUMENT, "pushes", table(known(CSV)))
+        replace_block(DOCUMENT, "pushes", table(rows))
 
 
 if __name__ == "__main__":

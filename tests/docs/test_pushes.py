@@ -20,28 +20,28 @@ def pushes():
 
 
 def test_the_table_is_that_of_the_file_and_both_laws_save_nearly_the_same(pushes):
-    from buffer_document import block
+    from buffer_document import block, read_csv
 
-    rows = pushes.known(pushes.CSV)
+    rows = read_csv(pushes.CSV)
     assert block(pushes.DOCUMENT, "pushes") == pushes.table(rows)
-    lost = [row for row in rows.values() if not pushes.stood(row, "ours")]
-    assert lost
-    # Each of them was given to the other law as well, whatever else was.
-    assert all(row["weighted"] for row in lost)
-    assert sum(pushes.stood(row, "weighted") for row in lost) <= 0.01 * len(rows)
-    for number, row in rows.items():
-        drawn = pushes.draw(number)
-        assert row["frame"] == drawn.frame
-        for name in ("impulse", "angle", "duration"):
-            assert float(row[name]) == pytest.approx(getattr(drawn, name), rel=1e-3)
+    stood = {law: sum(row[law] == "True" for row in rows) for law in pushes.LAWS}
+    assert abs(stood["weighted"] - stood["ours"]) <= 0.01 * len(rows)
+    assert stood["ours"] < len(rows)
+    for row in rows:
+        impulse, angle, duration, frame = pushes.draw(int(row["number"]))
+        assert row["frame"] == frame
+        assert float(row["impulse"]) == pytest.approx(impulse, rel=1e-3)
+        assert float(row["angle"]) == pytest.approx(angle, rel=1e-3)
+        assert float(row["duration"]) == pytest.approx(duration, rel=1e-3)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("which", [0, 3, 9, 61, 300])
+@pytest.mark.parametrize("which", [0, 3, 9])
 def test_a_push_is_its_number(pushes, which):
-    row = pushes.known(pushes.CSV)[which]
+    from buffer_document import read_csv
+
+    row = next(row for row in read_csv(pushes.CSV) if int(row["number"]) == which)
     for law in pushes.LAWS:
-        if row[law]:
-            stood, _, error = pushes.stand_and_be_pushed(which, law)
-            assert str(stood) == row[law]
-            assert error == pytest.approx(float(row[f"{law}_com"]), rel=0.05)
+        stood, _, error = pushes.stand_and_be_pushed(which, law)
+        assert str(stood) == row[law]
+        assert error == pytest.approx(float(row[f"{law}_com"]), rel=0.05)
