@@ -7,7 +7,6 @@ import opspace as osc
 from opspace.controller.exported import exported
 from opspace.controller.reference import ReferenceController
 from opspace.errors import InputError
-from opspace.plan.scales import STANDING_SINGULARITY
 
 HALF, OFFSET = (0.085, 0.025), (0.035, 0.0, -0.035)
 FEET = ("left", "right")
@@ -111,21 +110,6 @@ def test_both_libraries_give_the_same_torque_and_forces(g1, seed):
     for side in FEET:
         a, b = (command.contacts[side].force for command in commands)
         assert np.max(np.abs(a - b)) < 1e-8
-
-
-@pytest.mark.parametrize("seed", range(4))
-def test_what_is_given_up_is_weighed_the_same_whether_directions_may_fade_or_not(g1, seed):
-    """The option is about directions that are nearly lost; where none is, it changes nothing."""
-    q, v = states(g1, seed, speed=1.0)
-    options = {"limits": osc.JointLimits(), "torque_limits": "priority"}
-    found = [
-        controller_of(g1, singularity=singularity, **options).step(0.0, q, v)
-        for singularity in (None, STANDING_SINGULARITY)
-    ]
-    assert all(osc.Status.FILTERED in command.status for command in found)
-    assert all(osc.Status.DIRECTION_OFF not in command.status for command in found)
-    largest = np.max(np.abs(found[0].tau))
-    assert np.max(np.abs(found[0].tau - found[1].tau)) < 1e-9 * largest
 
 
 @both_forms

@@ -6,7 +6,6 @@ import pytest
 from opspace.command import Command, ContactStatus, Found, Status
 from opspace.contacts import PointContact, SoleContact
 from opspace.errors import ScenarioError
-from opspace.plan.scales import STANDING_SINGULARITY, Singularity
 from opspace.record import load
 from opspace.record.contact_columns import felt_in
 from opspace.runs.event_times import began
@@ -40,7 +39,7 @@ def test_contacts_ground_and_events_are_built_from_their_entries():
     assert built.contacts["palm"].max_force == 50.0
     assert np.allclose(built.contacts["palm"].normal, [-1.0, 0.0, 0.0])
     assert built.plant.model.geom("opspace_touch/left/0").friction[0] == 0.7
-    assert built.controller.singularity == STANDING_SINGULARITY
+    assert built.controller.singularity is None
     command = built.controller.step(0.0, built.plant.q, built.plant.v)
     assert set(command.contacts) == {"left", "right"}
     assert sum(c.force[2] for c in command.contacts.values()) == pytest.approx(WEIGHT, rel=0.02)
@@ -55,13 +54,9 @@ def test_a_named_configuration_is_set_down_and_a_written_one_is_left():
     assert build(standing(start=written)).plant.q[2] == 0.9
 
 
-def test_a_buffer_is_narrow_on_contacts_unless_somebody_asked_for_another():
-    for asked, expected in (
-        ((), STANDING_SINGULARITY),
-        (("singularity.lower=0.1",), Singularity(lower=0.1)),
-        (("singularity=null",), None),
-    ):
-        assert build(standing(*asked)).controller.singularity == expected
+def test_a_buffer_is_what_somebody_asked_for():
+    assert standing().singularity is None
+    assert standing("singularity.lower=0.1").singularity.lower == 0.1
     assert build(standing("falling=null")).controller._fall is None
 
 

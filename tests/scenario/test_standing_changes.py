@@ -161,49 +161,15 @@ def test_a_push_is_taken_back_within_all_limits(robot, impulse, axis, most):
     assert max(seen.com) <= (0.015 if robot == "g1" else 0.06)
 
 
-def least_way(robot, sole, impulse, duration=0.1):
-    """How far a push from the front moves a point mass that presses on the heels from its first instant.
-
-    x'' = (x − d) g/h + F/m, d the way to the heels: no law that does not swing its body does with less.
-    """
-    robot.update(robot.q_reference, np.zeros(robot.nv))
-    com, mass = robot.com_position(), robot.M[0, 0]
-    middle = robot.position(sole.frame)[0] + sole.offset[0]
-    heels, height = (
-        com[0] - (middle - sole.half[0]),
-        com[2] - (robot.position(sole.frame)[2] + sole.offset[2]),
-    )
-    rate = np.sqrt(9.81 / height)
-    carried = impulse / (duration * mass)
-
-    def go(x, v, rest, t):
-        """x and v a time after, about a place of rest that they run away from."""
-        grow, shrink = np.cosh(rate * t), np.sinh(rate * t)
-        return rest + (x - rest) * grow + v / rate * shrink, (x - rest) * rate * shrink + v * grow
-
-    x, v = go(0.0, 0.0, heels - carried / rate**2, duration)
-    return heels - np.sqrt((heels - x) ** 2 - (v / rate) ** 2)
-
-
-@pytest.mark.slow
-def test_a_push_from_the_front_costs_no_more_than_heels_and_a_swing_can_help():
-    seen = pushed("g1", -8.0, 0)
-    least = least_way(seen.controller.robot, seen.built.contacts["left"], 8.0)
-    print("from the front", seen.step(PUSHED + 0.102), max(seen.com), least)
-    assert_it_stands_within_all_limits(seen, 1.0)
-    assert max(seen.com) <= least
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("robot", "impulse", "axis"),
     [
-        ("g1", 16.0, 0),
-        ("g1", -11.0, 0),
-        ("g1", 22.0, 1),
-        ("talos", 37.0, 0),
-        ("talos", -37.0, 0),
-        ("talos", 50.0, 1),
+        ("g1", 14.0, 0),
+        ("g1", 20.0, 1),
+        ("talos", 32.0, 0),
+        ("talos", -32.0, 0),
+        ("talos", 40.0, 1),
     ],
 )
 def test_as_much_as_feet_can_take_is_taken(robot, impulse, axis):

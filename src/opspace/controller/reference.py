@@ -24,7 +24,7 @@ from opspace.controller.wrenches import Wrenches, WrenchInput
 from opspace.errors import InputError, unknown_name
 from opspace.law import Profile
 from opspace.law.scalars import MAY_GIVE_UP
-from opspace.plan.scales import DEFAULT_SINGULARITY, STANDING_SINGULARITY, Scales, Singularity
+from opspace.plan.scales import DEFAULT_SINGULARITY, Scales, Singularity
 from opspace.robots.adapter import AdapterBase
 from opspace.robots.motor_range import motor_range
 from opspace.robots.payload import Payload
@@ -66,9 +66,9 @@ class ReferenceController:
         bias: ``"joint"`` (default) or ``"task"``, see `BIASES`.
         gravity: Who adds the torque that holds the weight, ``"controller"`` (default) or ``"robot"``,
             see `GRAVITIES`.
-        singularity: Buffer for singular directions; None switches their handling off. Where nothing
-            is given, a floating base has a narrower one, 0.003 to 0.03: contacts leave less of every
-            direction than is usual in flight.
+        singularity: Buffer for singular directions; None switches their handling off, and so does a
+            floating base where nothing else is given: what is usual in flight says nothing about a
+            robot that stands.
         damping: Joint damping in the motions that no task uses, 1/s; also what a joint is braked
             with in case of a fault. Unused where a posture task covers every joint.
         torque_limits: What happens to a torque above the motors' limits, see `TORQUE_LIMITS`.
@@ -519,7 +519,7 @@ def _singularity_of_base(
         raise InputError(
             f"robot {robot.name!r} has a floating base, whose controller does not keep distances yet"
         )
-    return STANDING_SINGULARITY if singularity is DEFAULT_SINGULARITY else singularity
+    return None if singularity is DEFAULT_SINGULARITY else singularity
 
 
 def _bind_collisions(collisions: CollisionAvoidance | None, robot: Robot) -> None:

@@ -68,11 +68,6 @@ class Singularity:
 
 
 DEFAULT_SINGULARITY = Singularity()
-STANDING_SINGULARITY = Singularity(lower=0.003, upper=0.03)
-"""What stands for the default where the base floats. Contacts leave a task a small part of the σ that is
-usual in flight, in every ordinary stance; tasks that contradict each other leave some orders less, and
-that is what has to fade. The scale of joints goes with ``upper``: a posture that counts for less than
-with this one lets the legs of a quadruped on two feet swing up to their limits."""
 
 
 FORCE = 0.1
@@ -85,15 +80,12 @@ class Scales:
 
     Args:
         robot: The robot of the controller.
-        option: How singular directions are faded out, None for not at all. Rows of a robot whose
-            base floats are scaled even so: what it gives up for forces is weighed by them, and in
-            SI units a light joint would count for a thousand times the centre of mass.
+        option: How singular directions are faded out, None for not at all.
     """
 
     def __init__(self, robot: Robot, option: Singularity | None) -> None:
         self._robot = robot
-        standing = option is None and robot.floating_base
-        self._scaled = STANDING_SINGULARITY if standing else option
+        self._option = option
         self._workspace = Workspace(robot)
         self._known: dict[int, tuple[weakref.ref[Task], np.ndarray, np.ndarray]] = {}
         self.buffer: SigmaBuffer | None = None
@@ -101,11 +93,10 @@ class Scales:
         self.joint, self.unit = 1.0, 1.0
         if option is not None:
             self.buffer = option.buffer
-        if self._scaled is not None:
             # A⁻¹ has no eigenvalue below joint_sigma: joint rows scaled like this are never
             # singular.
-            self.joint = 0.5 * self._workspace.joint_sigma / self._scaled.upper
-            self.unit = 0.5 / self._scaled.upper
+            self.joint = 0.5 * self._workspace.joint_sigma / option.upper
+            self.unit = 0.5 / option.upper
 
     def prepare(self, task: Task) -> None:
         """Bind a task and its activation to the robot, and find its scale where that is not known yet.
@@ -162,10 +153,10 @@ class Scales:
         return entry[1:] if entry is not None and entry[0]() is task else None
 
     def _scale(self, task: Task, workspace: np.ndarray) -> np.ndarray:
-        if self._scaled is None:
+        if self._option is None:
             return np.ones(task.rows)
         if isinstance(task, PostureTask | JointTask):
             return np.full(task.rows, self.joint)
-        if self._scaled.scale == "absolute":
+        if self._option.scale == "absolute":
             return np.ones(task.rows)
         return FORCE * workspace if isinstance(task, ForceTask) else workspace

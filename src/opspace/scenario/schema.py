@@ -9,7 +9,6 @@ from pydantic import Field, PrivateAttr, ValidationInfo, field_validator, model_
 
 from opspace.errors import ScenarioError
 from opspace.law.scalars import LIMIT_LAWS
-from opspace.plan.scales import STANDING_SINGULARITY
 from opspace.scenario.contact_entries import AnyContact, GroundEntry
 from opspace.scenario.document import Document, Key, key_text
 from opspace.scenario.events import Event, ProfileName, check_events
@@ -274,8 +273,8 @@ class Scenario(Entry):
     )
     singularity: SingularityEntry | None = Field(
         default_factory=SingularityEntry,
-        description="singularity avoidance; null is none, and a robot on contacts has a narrower "
-        "buffer where nothing is said, 0.003 to 0.03",
+        description="singularity avoidance; null is none, which a robot on contacts has where "
+        "nothing is said",
     )
     plant: PlantEntry = Field(default_factory=PlantEntry, description="the simulated robot")
     stop: StopEntry = Field(default_factory=StopEntry, description="when a run is given up")
@@ -289,11 +288,10 @@ class Scenario(Entry):
 
     @model_validator(mode="before")
     @classmethod
-    def _narrow_buffer_on_contacts(cls, data: Any) -> Any:
-        # What is usual in flight is much more than a robot has that stands.
+    def _no_buffer_on_contacts(cls, data: Any) -> Any:
+        # What is usual in flight says nothing about a robot that stands.
         if isinstance(data, dict) and data.get("contacts"):
-            narrow = {"lower": STANDING_SINGULARITY.lower, "upper": STANDING_SINGULARITY.upper}
-            return {"singularity": narrow, **data}
+            return {"singularity": None, **data}
         return data
 
     @field_validator("tasks")
