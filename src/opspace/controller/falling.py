@@ -44,7 +44,7 @@ class FallRule:
     """
 
     after: float = 0.2
-    tilt: float = 1.4
+    tilt: float = 1.0
 
     def __post_init__(self) -> None:
         for what in ("after", "tilt"):

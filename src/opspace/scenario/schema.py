@@ -161,7 +161,7 @@ class FallingEntry(Entry):
         default=0.2, description="how long it may be not balanced without getting better [s]"
     )
     tilt: Annotated[float, Number("rad", above=0.0)] = Field(
-        default=1.4, description="how far its base may turn from where it was upright [rad]"
+        default=1.0, description="how far its base may turn from where it was upright [rad]"
     )
 
 
