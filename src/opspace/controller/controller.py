@@ -166,9 +166,12 @@ class Controller(ReferenceController):
                 robot.update(robot.q, robot.v)
                 self._leave(members)
                 return self._answer(t, members, STATUSES[timing])
+            if forces is not None:
+                forces.moved = True
         _, plan, address, torque, memory = laid_out
-        if forces is not None:
+        if forces is not None and forces.moved:
             plan.remember()
+            forces.moved = False
         if plan.moving or CHANGES.last is not plan.seen:
             if plan.distances is not None and not self._watches_all(plan):
                 _, plan, address, torque, memory = self._lay_out_anew(members)

@@ -49,6 +49,8 @@ class WrenchInput:
         self._only: tuple[str, TouchMemory, Array, Any] | None = None
         self._given: Mapping[str, Array | None] = {}
         self._taken: list[float] | None = None
+        # Whether force tasks may keep their memory elsewhere than at the tick before.
+        self.moved = True
 
     @property
     def given(self) -> Mapping[str, Array | None]:
@@ -97,6 +99,7 @@ class WrenchInput:
                 except _NO_WRENCH:
                     pass
         self._settle()
+        self.moved = True
         given = {name: self._checked(name, value) for name, value in (wrenches or {}).items()}
         status = 0
         for task, sensor in self._present:
