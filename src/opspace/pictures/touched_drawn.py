@@ -13,7 +13,7 @@ import numpy as np
 from opspace.errors import missing_extra
 from opspace.pictures.offscreen import Canvas
 from opspace.record import Recording
-from opspace.record.wrench_columns import GROUP, latest
+from opspace.record.wrench_columns import GROUP, latest, touched
 
 try:
     import mujoco
@@ -40,8 +40,7 @@ class TouchedDrawn:
 
     def __init__(self, recording: Recording) -> None:
         header = recording.header
-        plant = header.get("scenario", {}).get("plant", {})
-        self._pieces = [*plant.get("surfaces", ()), *plant.get("holes", ())]
+        self._pieces = touched(header)
         tasks: Mapping[str, Mapping[str, Any]] = header.get("tasks", {})
         sizes = [np.linalg.norm(one["press"]["force"]) for one in tasks.values() if "press" in one]
         sensor = f"{GROUP}/{header.get('robot', {}).get('tool')}"

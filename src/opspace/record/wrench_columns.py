@@ -88,6 +88,12 @@ def row_of_touches(tasks: Sequence[Task]) -> list[np.ndarray]:
     return parts
 
 
+def touched(header: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """List what the tool may touch, where a recording's scenario says so: surfaces and holes."""
+    plant = header.get("scenario", {}).get("plant", {})
+    return [*plant.get("surfaces", ()), *plant.get("holes", ())]
+
+
 def latest(wrenches: np.ndarray, row: int) -> np.ndarray:
     """Give what was measured last up to a tick; NaN where `RECENT` ticks have brought nothing.
 

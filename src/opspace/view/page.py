@@ -15,6 +15,7 @@ from opspace.errors import InputError, ModelWarning, missing_extra
 from opspace.record.contact_columns import GROUP
 from opspace.record.growing import GrowingRecording
 from opspace.record.obstacle_columns import HEADER_KEY
+from opspace.record.wrench_columns import touched
 from opspace.robots import Robot, load_robot
 from opspace.robots.joint_units import effort_unit
 
@@ -92,7 +93,7 @@ class Page:
         }
         self._touches: TouchScene | None = None
         if self._presses:
-            self._touches = TouchScene(self._server, robot, self._presses, _touched(self._about))
+            self._touches = TouchScene(self._server, robot, self._presses, touched(self._about))
         self._ask = ask
         self._charted = self._drawn = 0.0
         self._shown: tuple[int, bool] | None = None
@@ -264,12 +265,6 @@ def _check_host(host: str) -> None:
         socket.create_server((host, 0)).close()
     except OSError as error:
         raise InputError(f"no page can be opened at the address {host!r}: {error}") from None
-
-
-def _touched(about: dict[str, Any]) -> list[dict[str, Any]]:
-    """List what the tool may touch, where a scenario says so: surfaces and holes."""
-    plant = about.get("scenario", {}).get("plant", {})
-    return [*plant.get("surfaces", ()), *plant.get("holes", ())]
 
 
 def _homes(about: dict[str, Any]) -> dict[str, float]:
