@@ -12,7 +12,17 @@ import numpy as np
 from opspace.command import NO_CONTACTS, ContactStatus, Status
 from opspace.controller.collisions import DistanceTerms
 from opspace.controller.limit_task_sets import LimitTerms
-from opspace.law import BROKEN, LOST, excess, excess_of_rows, nearest_acceleration
+from opspace.law import (
+    BROKEN,
+    LOST,
+    Stacks,
+    excess,
+    excess_of_rows,
+    leave_room,
+    nearest_acceleration,
+    task_metric,
+    wants_more,
+)
 from opspace.robots.protocol import Robot
 
 
@@ -131,47 +141,67 @@ class Kept(NamedTuple):
     hindrance: float = 0.0
 
 
-def realise(bounds: Bounds, tau: np.ndarray, metric: Callable[[], np.ndarray]) -> Kept:
+def realise(bounds: Bounds, tau: np.ndarray, stacks: Callable[[], Stacks]) -> Kept:
     """Replace a torque by the nearest one with which no joint, motor or distance does more than it may.
+
+    Before that levels leave those above what is left of a limit, see `opspace.law.leave_room`.
 
     Args:
         bounds: What they may.
         tau: (n,) torque, N·m.
-        metric: Gives W, in which "near" is measured; asked only where something is outside.
+        stacks: Gives what is mixed, by which "near" is measured; asked only where a limit is near.
 
     Returns:
         The torque and what happened.
     """
-    M, bias = bounds.M, bounds.bias
+    M, bias, near = bounds.M, bounds.bias, bounds.distances
     acceleration = np.linalg.solve(M, tau - bias)
-    near = bounds.distances
-    if not bounds.broken(tau, acceleration):
-        nothing = np.zeros(0 if near is None else near.most.size)
+    taken = np.zeros(0 if near is None else near.most.size)
+    upper = lower = np.zeros(bias.size)
+    gave_way, motors = wants_more(acceleration, bounds.lower, bounds.upper), False
+    if gave_way:
+        L = np.linalg.cholesky(M)
+        acceleration, upper, lower = leave_room(
+            L, stacks(), acceleration, bounds.lower, bounds.upper
+        )
+        tau = M @ acceleration + bias
+    if bounds.broken(tau, acceleration):
+        found = nearest_acceleration(
+            np.linalg.cholesky(M),
+            metric_of(stacks(), bias.size),
+            acceleration,
+            bounds.lower,
+            bounds.upper,
+            -bounds.room - bias,
+            bounds.room - bias,
+            None if near is None else near.G,
+            None if near is None else near.most,
+        )
+        acceleration, motors, taken = found.acceleration, found.motors, found.rows
+        upper, lower = upper + found.upper, lower + found.lower
+        tau = np.clip(M @ acceleration + bias, -bounds.room, bounds.room)
+    elif not gave_way:
         lost = Status.LIMIT_LOST if bounds.lost(acceleration) else Status.OK
-        return Kept(tau, lost, taken=nothing)
-    found = nearest_acceleration(
-        np.linalg.cholesky(M),
-        metric(),
-        acceleration,
-        bounds.lower,
-        bounds.upper,
-        -bounds.room - bias,
-        bounds.room - bias,
-        None if near is None else near.G,
-        None if near is None else near.most,
-    )
-    tau = np.clip(M @ found.acceleration + bias, -bounds.room, bounds.room)
+        return Kept(tau, lost, taken=taken)
     status = Status.FILTERED
-    if found.motors:
+    if motors:
         status |= Status.TORQUE_SCALED
-    if bounds.lost(found.acceleration):
+    if bounds.lost(acceleration):
         status |= Status.LIMIT_LOST
-    if np.any(found.rows > 0.0):
+    if np.any(taken > 0.0):
         status |= Status.COLLISION
-    if bounds.will_close(found.acceleration):
+    if bounds.will_close(acceleration):
         status |= Status.COLLISION_LOST
-    limits = acting(bounds.terms, found.upper, found.lower)
-    return Kept(tau, status, limits, found.rows)
+    return Kept(tau, status, acting(bounds.terms, upper, lower), taken)
+
+
+def metric_of(stacks: Stacks, n: int) -> np.ndarray:
+    """Return W of `opspace.law.task_metric` for what is mixed, (n, n)."""
+    shares = [0.0] * len(stacks.whitened)
+    for weight, present in stacks.corners:
+        for i in present:
+            shares[i] += weight
+    return task_metric(stacks.whitened, stacks.levels, shares, n)
 
 
 def change_within_tick(

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from opspace.command import Found, Status
-from opspace.controller.bounds import Bounds, Kept, change_within_tick, realise
+from opspace.controller.bounds import Bounds, Kept, change_within_tick, metric_of, realise
 from opspace.controller.collisions import DistanceTerms, distance_terms
 from opspace.controller.contact_stages import (
     Footing,
@@ -31,12 +31,12 @@ from opspace.law import (
     LawInfo,
     Motors,
     SigmaBuffer,
+    Stacks,
     TaskSet,
     Weighted,
     blended_torque,
     corners,
     levels_of,
-    task_metric,
     whiten,
 )
 from opspace.law.blending import combined
@@ -201,7 +201,7 @@ def tick(k: Given) -> Answer | None:
         gamma, info = law(k, L, mixed, tasks, above)
         distances = measure_distances(k)
         if k.base:
-            kept = stand(k, L, limits, touches, metric(L, tasks), gamma)
+            kept = stand(k, L, limits, touches, metric_of(without_rest(L, tasks), k.v.size), gamma)
         else:
             kept = keep_bounds(k, L, limits, distances, tasks, torque(k, gamma))
     except (InputError, np.linalg.LinAlgError):
@@ -421,9 +421,9 @@ def keep_bounds(
     if keeps or rules.keep_torque or distances is not None:
         room = k.torque_limit if rules.keep_torque else np.full(k.v.size, np.inf)
         bounds = Bounds(keeps, k.M, k.bias, room, distances)
-        kept = realise(bounds, tau, lambda: metric(L, tasks))
+        kept = realise(bounds, tau, lambda: without_rest(L, tasks))
         if keeps and looks_ahead(k):
-            kept = look_through(k, bounds, tau, kept, lambda: metric(L, tasks))
+            kept = look_through(k, bounds, tau, kept, lambda: without_rest(L, tasks))
     if observer is not None:
         observer.remember(k.t, k.v, np.linalg.solve(k.M, kept.tau - k.bias))
     return kept
@@ -435,7 +435,7 @@ def looks_ahead(k: Given) -> bool:
 
 
 def look_through(
-    k: Given, bounds: Bounds, tau: np.ndarray, kept: Kept, metric: Callable[[], np.ndarray]
+    k: Given, bounds: Bounds, tau: np.ndarray, kept: Kept, stacks: Callable[[], Stacks]
 ) -> Kept:
     """Keep the bounds of the mean acceleration, that of the middle of the tick."""
     taken_off = np.zeros(len(bounds.terms))
@@ -444,7 +444,7 @@ def look_through(
         if np.all(np.abs(more - taken_off) <= SEEN * np.maximum(1.0, more)):
             return kept
         taken_off = more
-        kept = realise(bounds.after(more), tau, metric)
+        kept = realise(bounds.after(more), tau, stacks)
         if Status.FILTERED not in kept.status:
             return kept
     acceleration, change = middle(k, kept)
@@ -461,14 +461,12 @@ def middle(k: Given, kept: Kept) -> tuple[np.ndarray, np.ndarray]:
     return acceleration, change
 
 
-def metric(L: np.ndarray, tasks: Blend) -> np.ndarray:
-    """W of `opspace.law.task_metric`, to which damping of the rest does not belong."""
-    shares = [0.0] * len(tasks.task_sets)
-    for weight, present in tasks.corners:
-        for i in present:
-            shares[i] += weight
+def without_rest(L: np.ndarray, tasks: Blend) -> Stacks:
+    """Tell what is mixed, damping of the rest apart; its task set is the last."""
     sets = [task for task in tasks.task_sets if task.name != REST]
-    return task_metric(whiten(sets, L), levels_of(sets), shares, L.shape[0])
+    here = frozenset(range(len(sets)))
+    blend = [Weighted(weight, present & here) for weight, present in tasks.corners]
+    return Stacks(whiten(sets, L), levels_of(sets), blend, len(sets) < len(tasks.task_sets))
 
 
 def status(k: Given, tau: np.ndarray, info: LawInfo, found: Found) -> Status:

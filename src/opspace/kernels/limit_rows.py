@@ -38,6 +38,7 @@ from opspace.kernels.limit_columns import (
     SPEED,
 )
 from opspace.kernels.projection import nearest_acceleration, task_metric
+from opspace.kernels.room_below import leave_room
 from opspace.kernels.task_rows import joint_position
 from opspace.law.scalars import BROKEN, LOOKS, LOST, SEEN, UNBOUNDED
 from opspace.machine.jit import jit
@@ -184,25 +185,39 @@ def look_through(work, stacks, n, kept):
 def realise(work, stacks, n):
     """Replace a torque and its acceleration by the nearest that the bounds allow.
 
+    Before that the levels below others leave these what is left of a limit.
+
     Returns:
         What happened, in the numbers of `opspace.Status`.
     """
     find_bounds(work, n)
     for i in range(work.distance_taken.shape[0]):
         work.distance_taken[i] = 0.0
+    gave_way = leave_room(work, stacks, n)
+    if gave_way:
+        _torque_of_acceleration(work, n)
     outside = _motors_exceeded(work, n) or find_excess(work, n) > BROKEN
-    if not (outside or approach(work) > BROKEN):
+    if outside or approach(work) > BROKEN:
+        task_metric(work, stacks)
+        nearest_acceleration(work.inertia, work.joint_acceleration, work.bounds, work.distances)
+        _torque_of_acceleration(work, n)
+        for a in range(n):
+            if work.option[KEEP_TORQUE] != 0.0:
+                work.tau[a] = min(max(work.tau[a], -work.torque_limit[a]), work.torque_limit[a])
+    elif gave_way:
+        for i in range(work.bounds.taken.shape[0]):
+            work.bounds.taken[i] = 0.0
+    else:
         return LIMIT_LOST if will_pass(work) else 0
-    task_metric(work, stacks)
-    x = work.joint_acceleration
-    nearest_acceleration(work.inertia, x, work.bounds, work.distances)
+    return _acting(work, n)
+
+
+@jit
+def _torque_of_acceleration(work, n):
     for a in range(n):
         work.tau[a] = work.balance[a]
         for b in range(n):
-            work.tau[a] += work.M[a, b] * x[b]
-        if work.option[KEEP_TORQUE] != 0.0:
-            work.tau[a] = min(max(work.tau[a], -work.torque_limit[a]), work.torque_limit[a])
-    return _acting(work, n)
+            work.tau[a] += work.M[a, b] * work.joint_acceleration[b]
 
 
 @jit
@@ -213,7 +228,8 @@ def _acting(work, n):
     for i in range(work.limit.shape[0]):
         limit, j = work.limit[i], work.limit_joint[i]
         if work.option[LIMIT_BOUND] != 0.0:
-            part = taken[j] if limit[SIGN] > 0.0 else taken[n + j]
+            side = j if limit[SIGN] > 0.0 else n + j
+            part = taken[side] + work.bounds.gave_way[side]
             work.limit_h[i] = min(part / limit[MARGIN], 1.0)
     for a in range(2 * n, 4 * n):
         if taken[a] > 0.0:

@@ -88,7 +88,7 @@ def _clean(count, n, bounds):
     for a in range(bounds.taken.shape[0]):
         bounds.taken[a] = 0.0
     for _ in range(CLEANINGS):
-        _project(count, n, bounds)
+        project_on_bounds(count, n, bounds)
         for a in range(n):
             bounds.x[a] = bounds.y[a]
         for i in range(count):
@@ -157,8 +157,14 @@ def _two_sided(count, n, owner, least, most, softness, bounds):
 
 
 @jit
-def _project(count, n, bounds):
-    """Y = x less the normals times their multipliers, none of which is negative."""
+def project_on_bounds(count, n, bounds):
+    """Find y = x less the normals times their multipliers, none of which is negative.
+
+    Args:
+        count: Number of bounds.
+        n: Size of x.
+        bounds: `BOUNDS`; x, normal, bound and softness are read, y and multiplier written.
+    """
     for i in range(count):
         bounds.multiplier[i], bounds.scale[i] = 0.0, abs(bounds.bound[i])
         for a in range(n):

@@ -3,6 +3,7 @@
 from opspace.law.activation import Activation, Buffer, Profile, Ramp
 from opspace.law.blending import BLENDINGS, Weighted, combined, corners, leaning_chain
 from opspace.law.hierarchy import levels_of, whiten
+from opspace.law.leave_room import RoomLeft, Stacks, leave_room, motions_left, wants_more
 from opspace.law.nearest import (
     Nearest,
     excess,
@@ -29,7 +30,9 @@ __all__ = [
     "Nearest",
     "Profile",
     "Ramp",
+    "RoomLeft",
     "SigmaBuffer",
+    "Stacks",
     "TaskSet",
     "Weighted",
     "blended_torque",
@@ -39,9 +42,12 @@ __all__ = [
     "excess_of_rows",
     "intermediate_values",
     "leaning_chain",
+    "leave_room",
     "levels_of",
+    "motions_left",
     "nearest_acceleration",
     "task_metric",
     "task_torque",
+    "wants_more",
     "whiten",
 ]

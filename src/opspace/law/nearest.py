@@ -75,12 +75,12 @@ def nearest_point(
 
         min ‖y − x‖² + Σ excess²/softness
 
-    with rows of unit length. The dual is a least-squares problem in multipliers that are not
-    negative; the answer is a continuous function of everything given.
+    with rows of unit length, or shorter ones, which are softer. The dual is a least-squares problem in
+    multipliers that are not negative; the answer is a continuous function of everything given.
 
     Args:
         x: (n,).
-        rows: (k, n) of unit length.
+        rows: (k, n) of unit length or less.
         bounds: (k,) finite.
         softness: (k,) above 0.
 

@@ -577,6 +577,18 @@ def level_weight(below: float) -> float:
     return min(LEVEL_RATIO**below, MOST_WEIGHT)
 
 
+LEFT = 0.5
+"""Part of what a limit allows its joint that levels may use which are not the first."""
+UNSEEN = 1e6
+"""How much more an acceleration counts that levels above see than one that they do not: these may give
+way to a limit before the others by so much."""
+ROOM_SOFT = 7e-3
+"""A limit whose joint the levels below move by less than this part of its mobility is hardly any of
+theirs: what they would have to do about it grows without end as that part goes to zero."""
+ROOM_CLEANINGS = 8
+"""How often they are projected, each time on what softness left before: one joint of which they have
+the part s keeps (ROOM_SOFT / (s + ROOM_SOFT))⁸ of its excess."""
+
 SOFT = 1e-7
 """How soft bounds on accelerations are; where they contradict each other or the motors, the excess is
 shared."""

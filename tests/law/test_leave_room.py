@@ -1,0 +1,80 @@
+"""Levels below leave those above what is left of a joint's limit, and take nothing from them."""
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+
+from opspace.law import Stacks, Weighted, leave_room, motions_left, wants_more
+from opspace.law.hierarchy import Level, WhitenedTask
+from opspace.law.scalars import LEFT, ROOM_CLEANINGS, ROOM_SOFT
+
+SEEDS = st.integers(0, 2**32 - 1)
+INF = np.inf
+
+
+def problem(seed):
+    """An inertia, two levels above damping, an acceleration, and bounds near for some joints."""
+    rng = np.random.default_rng(seed)
+    n = int(rng.integers(3, 9))
+    B = rng.normal(size=(n, n))
+    L = np.linalg.cholesky(B @ B.T + 0.1 * np.eye(n))
+    sizes = rng.integers(1, max(2, n // 2), 2)
+    whitened = [WhitenedTask(rng.normal(size=(m, n)), np.zeros(m)) for m in sizes]
+    near = rng.random((2, n)) < 0.4
+    lower = np.where(near[0], -rng.exponential(1.0, n), -INF)
+    upper = np.where(near[1], rng.exponential(1.0, n), INF)
+    return L, whitened, 10.0 * rng.normal(size=n), lower, upper
+
+
+def stacks_of(whitened, corners, damped=True):
+    levels = [Level(i, frozenset([i])) for i in range(len(whitened))]
+    return Stacks(whitened, levels, [Weighted(w, frozenset(k)) for w, k in corners], damped)
+
+
+@given(seed=SEEDS)
+def test_levels_above_lose_nothing(seed):
+    L, whitened, wanted, lower, upper = problem(seed)
+    found = leave_room(L, stacks_of(whitened, [(1.0, {0, 1})]), wanted, lower, upper)
+    change = L.T @ (found.acceleration - wanted)
+    size = np.linalg.norm(L.T @ wanted)
+    assert np.linalg.norm(whitened[0].J @ change) < 1e-3 * size * np.linalg.norm(whitened[0].J)
+    if not wants_more(wanted, lower, upper):
+        assert np.all(found.upper == 0.0)
+        assert np.all(found.lower == 0.0)
+
+
+@given(seed=SEEDS)
+def test_what_levels_below_add_is_half_of_what_a_limit_allows(seed):
+    """Where they move the joint by more than what is softened away, and no other is near its limit."""
+    L, whitened, wanted, lower, upper = problem(seed)
+    lower[:], upper[1:] = -INF, INF
+    stacks = stacks_of(whitened[:1], [(1.0, {0})])
+    found = leave_room(L, stacks, wanted, lower, upper)
+    P = motions_left(stacks, 1, len(L), weighed=False)
+    joints = np.linalg.inv(L).T
+    above = joints @ (L.T @ found.acceleration - P @ (L.T @ found.acceleration))
+    mobile = np.sum((joints @ P) * joints, axis=1) / np.sum(joints**2, axis=1)
+    size = np.max(np.abs(joints @ L.T @ wanted)) + np.max(np.abs(found.acceleration))
+    soft = 2.0 * size * (ROOM_SOFT / (mobile + ROOM_SOFT)) ** ROOM_CLEANINGS + 1e-3 * size
+    for sign, most in ((1.0, upper), (-1.0, -lower)):
+        room = LEFT * np.maximum(most, 0.0) + np.maximum(sign * above, 0.0)
+        assert np.all(sign * found.acceleration <= room + soft)
+
+
+@given(seed=SEEDS, share=st.floats(1e-9, 1e-6))
+def test_a_level_that_has_hardly_come_changes_hardly_anything(seed, share):
+    L, whitened, wanted, lower, upper = problem(seed)
+    without = leave_room(L, stacks_of(whitened, [(1.0, {0})]), wanted, lower, upper)
+    coming = stacks_of(whitened, [(1.0 - share, {0}), (share, {0, 1})])
+    found = leave_room(L, coming, wanted, lower, upper)
+    difference = np.linalg.norm(L.T @ (found.acceleration - without.acceleration))
+    assert difference <= 1e4 * share * np.linalg.norm(L.T @ wanted)
+
+
+@given(seed=SEEDS)
+def test_the_answer_hardly_changes_where_the_wish_hardly_does(seed):
+    L, whitened, wanted, lower, upper = problem(seed)
+    stacks = stacks_of(whitened, [(0.4, {0}), (0.6, {0, 1})])
+    other = wanted + 1e-6 * np.linalg.inv(L).T @ np.ones(len(L)) / np.sqrt(len(L))
+    found = [leave_room(L, stacks, x, lower, upper).acceleration for x in (wanted, other)]
+    assert np.linalg.norm(L.T @ (found[1] - found[0])) < 1e-6 * 50.0
