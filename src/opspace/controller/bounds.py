@@ -159,6 +159,7 @@ def realise(bounds: Bounds, tau: np.ndarray, metric: Callable[[], np.ndarray]) -
         bounds.room - bias,
         None if near is None else near.G,
         None if near is None else near.most,
+        None if near is None else near.softness(M),
     )
     tau = np.clip(M @ found.acceleration + bias, -bounds.room, bounds.room)
     status = Status.FILTERED

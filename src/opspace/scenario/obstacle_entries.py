@@ -9,7 +9,7 @@ from pydantic import Field, model_validator
 
 from opspace.scenario.fields import Checked, Entry, Number, listed, problem, shown
 from opspace.scenario.targets import Point, Quaternion
-from opspace.tasks import Ball, Box, Capsule, CollisionAvoidance, HalfSpace
+from opspace.tasks import Ball, Box, Capsule, CollisionAvoidance, ConvexMesh, HalfSpace
 from opspace.tasks.obstacles import Obstacle
 from opspace.tasks.references.sample import Sample
 
@@ -21,6 +21,7 @@ NEEDED = {
     "ball": ("radius",),
     "capsule": ("radius", "length"),
     "box": ("size",),
+    "mesh": ("vertices",),
     "half-space": ("normal",),
 }
 """What each shape has beside its place."""
@@ -58,13 +59,16 @@ class Straight:
 class ObstacleEntry(Entry):
     """Something that the robot must not touch."""
 
-    shape: Literal["ball", "capsule", "box", "half-space"] = Field(description="what it is")
+    shape: Literal["ball", "capsule", "box", "mesh", "half-space"] = Field(description="what it is")
     radius: Positive | None = Field(default=None, description="of a ball or a capsule [m]")
     length: Positive | None = Field(
         default=None, description="of a capsule along its z axis, without its ends [m]"
     )
     size: Annotated[tuple[float, ...], Number("m", size=3, above=0.0)] | None = Field(
         default=None, description="sides of a box [m]"
+    )
+    vertices: list[Point] | None = Field(
+        default=None, description="points of which a mesh is the convex hull [m]"
     )
     normal: Annotated[tuple[float, ...], Number("1", size=3)] | None = Field(
         default=None, description="out of a half-space, towards where the robot may be"
@@ -80,7 +84,7 @@ class ObstacleEntry(Entry):
 
     @model_validator(mode="after")
     def _check_shape(self) -> Self:
-        for key in ("radius", "length", "size", "normal"):
+        for key in ("radius", "length", "size", "vertices", "normal"):
             needed = key in NEEDED[self.shape]
             if needed and getattr(self, key) is None:
                 raise problem(f"is needed for a {self.shape}", key)
@@ -99,6 +103,8 @@ class ObstacleEntry(Entry):
             return Capsule(*size, place, self.orientation, **given)
         if self.shape == "box":
             return Box(self.size or (), place, self.orientation, **given)
+        if self.shape == "mesh":
+            return ConvexMesh(self.vertices or (), place, self.orientation, **given)
         return HalfSpace(place, self.normal or (), **given)
 
 
