@@ -7,9 +7,12 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import numpy as np
 from pydantic import Field, model_validator
 
+from opspace.robots import load_robot
+from opspace.robots.shapes import LinkCapsule
 from opspace.scenario.fields import Checked, Entry, Number, listed, problem, shown
-from opspace.scenario.targets import Point, Quaternion
-from opspace.tasks import Ball, Box, Capsule, CollisionAvoidance, ConvexMesh, HalfSpace
+from opspace.scenario.references import as_reference, build_target, vectors
+from opspace.scenario.targets import Point, PostureTarget, Quaternion
+from opspace.tasks import Ball, Box, Capsule, CollisionAvoidance, ConvexMesh, HalfSpace, OtherRobot
 from opspace.tasks.obstacles import Obstacle
 from opspace.tasks.references.sample import Sample
 
@@ -108,6 +111,54 @@ class ObstacleEntry(Entry):
         return HalfSpace(place, self.normal or (), **given)
 
 
+class OtherRobotEntry(Entry):
+    """Another robot in the workspace, which does not look out for this one."""
+
+    robot: str = Field(
+        description="name of a robot, or path of a .urdf or .xml file from the working directory"
+    )
+    position: Point = Field(description="where its base is [m]")
+    orientation: Quaternion = Field(
+        default=(1.0, 0.0, 0.0, 0.0), description="axes of its base, quaternion wxyz"
+    )
+    target: PostureTarget | None = Field(
+        default=None,
+        description="how its joints move, beginning in its reference posture; null is not at all",
+    )
+    ignore: list[str] = Field(default_factory=list, description="links that may touch it")
+
+    def build(self, name: str) -> OtherRobot:
+        """Make its links.
+
+        Args:
+            name: What the names of its links begin with.
+
+        Raises:
+            OpspaceError: A robot or numbers that cannot be used.
+        """
+        robot = load_robot(self.robot)
+        place = self.position, self.orientation
+        other = OtherRobot(robot, *place, name=name, ignore=self.ignore)
+        space = vectors(np.array(robot.q_reference))
+        other.play(as_reference(build_target(self.target, space), space))
+        return other
+
+
+class LinkCapsuleEntry(Entry):
+    """A capsule around a link, or a part of it."""
+
+    frame: str = Field(description="frame of the robot that it is fixed to")
+    start: Point = Field(description="centre of one end in the axes of the frame [m]")
+    end: Point = Field(description="centre of the other end; the same makes a ball [m]")
+    radius: Positive = Field(description="radius [m]")
+
+    def build(self) -> LinkCapsule:
+        """Make it."""
+        x, y, z = self.start
+        u, v, w = self.end
+        return LinkCapsule(self.frame, (x, y, z), (u, v, w), self.radius)
+
+
 class CollisionsEntry(Entry):
     """What the robot is kept away from."""
 
@@ -120,17 +171,29 @@ class CollisionsEntry(Entry):
     pairs: Annotated[Any, Checked(_pairs)] = Field(
         default="auto", description="links that are kept apart: auto, none, or pairs of frames"
     )
+    shapes: list[LinkCapsuleEntry] | None = Field(
+        default=None, description="capsules of links; null fits them to the robot's own geometry"
+    )
     obstacles: dict[str, ObstacleEntry] = Field(
         default_factory=dict, description="name: what is in the workspace"
+    )
+    others: dict[str, OtherRobotEntry] = Field(
+        default_factory=dict, description="name: another robot in the workspace"
     )
 
     def build(self) -> CollisionAvoidance:
         """Make the guard.
 
         Raises:
-            InputError: A number that cannot be used.
+            OpspaceError: A robot or a number that cannot be used.
         """
         obstacles = [entry.build(name) for name, entry in self.obstacles.items()]
+        for name, other in self.others.items():
+            obstacles.extend(other.build(name).obstacles)
         return CollisionAvoidance(
-            *obstacles, margin=self.margin, brake=self.brake, pairs=self.pairs
+            *obstacles,
+            margin=self.margin,
+            shapes="model" if self.shapes is None else [shape.build() for shape in self.shapes],
+            brake=self.brake,
+            pairs=self.pairs,
         )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from types import MappingProxyType
 from typing import Any, NamedTuple, cast
 
@@ -122,7 +122,12 @@ class Obstacle:
             return here
         begin = getattr(path, "begin_at", None)
         path = path if begin is None else begin(t)
-        sample = path(t)
+        sample: Any = path(t)
+        if isinstance(sample, Placing):
+            here = sample
+            if self._state is found:
+                self._state = here, path
+            return here
         speed = sample.v if np.size(sample.v) else _NONE
         here, _ = self._told(sample.x, here.rotation, speed, _NONE)
         if self._state is found:  # nobody has placed it meanwhile
@@ -157,6 +162,15 @@ class Obstacle:
             _STILL if velocity is None else velocity,
             here.position,
         )
+        CHANGES.last = object()
+
+    def follow(self, course: Callable[[float], Placing]) -> None:
+        """Let it go where something says that it is, turn and all, from the next tick on.
+
+        Args:
+            course: Gives the placing at a time, s.
+        """
+        self._state = self._state[0], course
         CHANGES.last = object()
 
     def lead(self, goal: ArrayLike, t: float) -> None:
