@@ -68,7 +68,9 @@ def test_both_forms_keep_the_same_distances(both, seed):
 
 
 def test_what_is_far_away_changes_no_bit():
-    (with_, _), (without, guard) = (standing(osc.Controller, *far) for far in ((), (osc.Ball(0.1),)))
+    (with_, _), (without, guard) = (
+        standing(osc.Controller, *far) for far in ((), (osc.Ball(0.1),))
+    )
     guard["ball"].place((5.0, 0.0, 0.0))
     q, v = np.array(with_.robot.q_reference), np.zeros(with_.robot.nv)
     one, two = with_.step(0.0, q, v), without.step(0.0, q, v)

@@ -140,7 +140,10 @@ class OtherRobotEntry(Entry):
         place = self.position, self.orientation
         other = OtherRobot(robot, *place, name=name, ignore=self.ignore)
         space = vectors(np.array(robot.q_reference))
-        other.play(as_reference(build_target(self.target, space), space))
+        course = as_reference(build_target(self.target, space), space)
+        start = course(0.0)
+        other.follow(start.x, start.v)  # which refuses numbers that do not fit
+        other.play(course)
         return other
 
 
