@@ -3,7 +3,8 @@
 ``python docs/evidence/collision_campaign.py --starts 10000 --processes 8`` draws 2 to 6 obstacles, a
 posture clear of them, a target anywhere, a stiffness and a swap of levels on the way, with joint, speed
 and torque limits on, and says how near anything came before a tick said ``COLLISION_LOST``. A start is
-its number: ``--first 40 --starts 1`` is the fortieth again. Progress goes to the standard error.
+its number: ``--first 40 --starts 1`` is the fortieth again. ``--minutes 30`` ends it early and says how
+many there were. Progress goes to the standard error.
 """
 
 import argparse
@@ -11,6 +12,7 @@ import sys
 from collections import Counter
 from concurrent.futures import ProcessPoolExecutor
 from functools import cache
+from time import perf_counter
 from typing import NamedTuple
 
 import numpy as np
@@ -172,15 +174,17 @@ def main():
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--kinds", nargs="+", choices=KINDS, default=KINDS)
     parser.add_argument("--processes", type=int, default=1)
+    parser.add_argument("--minutes", type=float, default=np.inf)
     told = parser.parse_args()
     numbers = range(told.first, told.first + told.starts)
     work = [(told.kinds[i % len(told.kinds)], i) for i in numbers]
     found = []
+    end, each = perf_counter() + 60.0 * told.minutes, 10 * told.processes
     with ProcessPoolExecutor(told.processes) as pool:
-        for run in pool.map(one_start, *zip(*work, strict=True)):
-            found.append(run)
-            if len(found) % 50 == 0:
-                print(f"{len(found)} of {len(work)}", file=sys.stderr, flush=True)
+        while len(found) < len(work) and perf_counter() < end:
+            next_ones = work[len(found) : len(found) + each]
+            found.extend(pool.map(one_start, *zip(*next_ones, strict=True)))
+            print(f"{len(found)} of {len(work)}", file=sys.stderr, flush=True)
     summary(found)
 
 

@@ -89,6 +89,7 @@ if TYPE_CHECKING:
     from opspace.tasks import ComTask as ComTask
     from opspace.tasks import Constant as Constant
     from opspace.tasks import Contact as Contact
+    from opspace.tasks import ConvexMesh as ConvexMesh
     from opspace.tasks import DistanceBuffer as DistanceBuffer
     from opspace.tasks import ForceTask as ForceTask
     from opspace.tasks import GiveWay as GiveWay
@@ -152,8 +153,8 @@ _NAMES = {
     "opspace.stack": "Stack",
     "opspace.tasks": (
         "ActivationProduct ActivationUnion AngularMomentumTask Ball Box Capsule Chain Circle "
-        "CollisionAvoidance ComTask Constant Contact DistanceBuffer ForceTask GiveWay HalfSpace "
-        "ImpedanceTask JerkLimited JointBuffer JointLimits JointTask MinimumJerk "
+        "CollisionAvoidance ComTask Constant Contact ConvexMesh DistanceBuffer ForceTask GiveWay "
+        "HalfSpace ImpedanceTask JerkLimited JointBuffer JointLimits JointTask MinimumJerk "
         "OrientationJerkLimited OrientationMinimumJerk OrientationTask OtherRobot PoseReference "
         "PoseTask "
         "PositionTask PostureTask Reference RelativeOrientationTask RelativePoseTask "

@@ -52,6 +52,23 @@ def test_links_are_where_the_robot_is_and_move_as_it_does():
         )
 
 
+def test_a_robot_that_plays_a_course_is_where_it_says():
+    robot = osc.load_robot("puma560")
+    played, told = (osc.OtherRobot(robot, (0.5, -0.3, 0.2), turned(), shapes=SHAPES) for _ in "ab")
+    goal = robot.q_reference + 0.3
+    course = osc.MinimumJerk(np.array(robot.q_reference), goal, duration=2.0)
+    played.play(course)
+    for t in (0.0, 0.7, 1.2):
+        told.follow(course(t).x, course(t).v)
+        for one, two in zip(played.obstacles, told.obstacles, strict=True):
+            assert one.moving
+            found = one.placing(t)
+            for here, there in zip(found, two.placing(t), strict=True):
+                assert here.tobytes() == there.tobytes()
+    played.follow(goal, np.zeros(6))
+    assert not played.obstacles[0].moving
+
+
 def test_wrong_states_are_refused():
     other = osc.OtherRobot(osc.load_robot("puma560"), shapes=SHAPES)
     for q in (np.zeros(5), np.full(6, np.nan)):

@@ -113,7 +113,7 @@ def test_compiled_is_readable(seed, contradictory):
     L, W, start, *bounds = problem(seed, contradictory)
     x = start.copy()
     given_ = BOUNDS.make({"n": x.size, "distances": 0})
-    none = DISTANCES.make({"n": x.size, "balls": 0, "sets": 0, "distances": 0})
+    none = DISTANCES.make({"n": x.size, "balls": 0, "sets": 0, "faces": 0, "distances": 0})
     for array, values in zip(given_, bounds, strict=False):
         array[:] = values
     inertia = make_inertia(np.arange(x.size) - 1)

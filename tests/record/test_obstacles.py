@@ -1,12 +1,14 @@
 """Obstacles in recordings: where every tick found them, and replays that find them there again."""
 
+import json
+
 import numpy as np
 import pytest
 
 import opspace as osc
 from opspace.controller.reference import ReferenceController
 from opspace.loop.requests import Changes, RequestDesk, RunRequest
-from opspace.record.obstacle_columns import recorded_obstacle
+from opspace.record.obstacle_columns import about_collisions, recorded_obstacle
 from opspace.tasks.obstacles import LED
 
 SHAPES = (
@@ -182,3 +184,12 @@ def test_an_obstacle_is_dragged_without_a_jump(tmp_path):
 def test_wrong_places_are_refused(asked, words):
     with pytest.raises(osc.InputError, match=words):
         RunRequest.read(asked)
+
+
+def test_a_mesh_is_described_so_that_it_can_be_made_again():
+    points = np.random.default_rng(0).normal(size=(20, 3))
+    guard = osc.CollisionAvoidance(osc.ConvexMesh(points, radius=0.02), shapes=SHAPES, pairs="none")
+    about = json.loads(json.dumps(about_collisions(guard)))["obstacles"]["mesh"]
+    again = recorded_obstacle("mesh", about)
+    assert again.faces.tobytes() == guard["mesh"].faces.tobytes()
+    assert again.radius == 0.02

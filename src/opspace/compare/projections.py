@@ -14,7 +14,8 @@ from opspace.controller.wrenches import Wrenches
 from opspace.errors import InputError
 from opspace.kernels.columns import KEEP_TORQUE
 from opspace.law import nearest_acceleration
-from opspace.law.convex import box_distance
+from opspace.law.convex import set_distance
+from opspace.law.polyhedra import Meshes
 from opspace.law.scalars import level_weight
 from opspace.machine.field_table import Record
 from opspace.plan.plan import Plan
@@ -226,7 +227,8 @@ def _distances(
     ball, axes, motion = d.ball_motion[balls], d.set_axes[sets], d.set_motion[sets]
     R = axes[:, :9].reshape(-1, 3, 3)  # the axes as rows
     local = np.einsum("kij,kj->ki", R, ball[:, :3] - axes[:, 9:])
-    _, n = box_distance(local, d.extent[sets, :3], d.extent[sets, 3:6])
+    meshes = Meshes(d.mesh[sets], d.face.reshape(-1, 4, 3))
+    _, n = set_distance(local, d.extent[sets, :3], d.extent[sets, 3:6], meshes)
     n = np.einsum("kij,ki->kj", R, n)
     v = ball[:, 3:6] - motion[:, :3] - np.cross(motion[:, 3:6], ball[:, :3])
     D, rate = np.array(tick.distance) - guard.margin, np.einsum("ki,ki->k", n, v)

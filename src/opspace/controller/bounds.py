@@ -176,6 +176,7 @@ def realise(bounds: Bounds, tau: np.ndarray, stacks: Callable[[], Stacks]) -> Ke
             bounds.room - bias,
             None if near is None else near.G,
             None if near is None else near.most,
+            None if near is None else near.softness(M),
         )
         acceleration, motors, taken = found.acceleration, found.motors, found.rows
         upper, lower = upper + found.upper, lower + found.lower

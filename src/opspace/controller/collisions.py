@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from opspace.law.convex import Bodies, DistanceRows, Points, distance_rows
+from opspace.law.nearest import softness_of_rows
 from opspace.law.scalars import closing_command, last_closing_command
 from opspace.robots.protocol import Robot
 from opspace.tasks.collision_avoidance import CollisionAvoidance
@@ -25,6 +26,8 @@ class DistanceTerms(NamedTuple):
         G: (rows, n) by how much joint accelerations let each shrink faster.
         most: (rows,) m/s².
         last: (rows,) m/s² before one will soon shrink faster than it may.
+        motors: (n,) what the motors give, N·m; inf where nobody says.
+        brake: Acceleration with which distances can be counted on to stop shrinking, m/s².
     """
 
     layout: DistanceLayout
@@ -33,6 +36,12 @@ class DistanceTerms(NamedTuple):
     G: np.ndarray
     most: np.ndarray
     last: np.ndarray
+    motors: np.ndarray
+    brake: float
+
+    def softness(self, M: np.ndarray) -> np.ndarray:
+        """Say how soft every bound is for the inertia M, (rows,); see `softness_of_rows`."""
+        return softness_of_rows(self.G, self.most, M, self.motors, self.brake)
 
     @property
     def by_name(self) -> Mapping[str, Placing]:
@@ -40,15 +49,24 @@ class DistanceTerms(NamedTuple):
         return self.layout.by_name(self.placings)
 
 
-def distance_terms(guard: CollisionAvoidance, robot: Robot, t: float) -> DistanceTerms:
-    """Evaluate all distances of a guard at the robot's present state and at time t, s."""
+def distance_terms(
+    guard: CollisionAvoidance, robot: Robot, t: float, motors: np.ndarray
+) -> DistanceTerms:
+    """Evaluate all distances of a guard at the robot's present state.
+
+    Args:
+        guard: What is kept apart.
+        robot: The robot.
+        t: Time, s.
+        motors: (n,) what the motors give, N·m; inf where nobody says.
+    """
     layout = guard.layout()
     placings = layout.placings(t)
     rows = rows_of(layout, robot, placings)
     balls, sets = layout.rows[:, 0], layout.rows[:, 1]
     distance = rows.distance - layout.ball_radius[balls] - layout.set_radius[sets]
     most, last = _commands(guard, distance - guard.margin, rows, layout.share[sets])
-    return DistanceTerms(layout, placings, distance, -rows.G, most, last)
+    return DistanceTerms(layout, placings, distance, -rows.G, most, last, motors, guard.brake)
 
 
 def _commands(
@@ -89,6 +107,7 @@ def rows_of(layout: DistanceLayout, robot: Robot, placings: Sequence[Placing]) -
         Bodies._make(part[sets] for part in bodies),
         layout.lower[sets],
         layout.upper[sets],
+        layout.meshes_of(sets),
     )
 
 

@@ -9,7 +9,8 @@ import numpy as np
 
 from opspace.command import ContactStatus, Status
 from opspace.contacts import ContactTerms, SoleContact
-from opspace.controller.bounds import Bounds, Kept, acting
+from opspace.controller.bounds import NOTHING, Bounds, Kept, acting
+from opspace.controller.collisions import DistanceTerms
 from opspace.controller.limit_task_sets import TOP, LimitTerms
 from opspace.law import TaskSet, corners
 from opspace.law.contact_forces import (
@@ -89,6 +90,7 @@ def stand(
     L: np.ndarray,
     limits: Sequence[LimitTerms],
     touches: Sequence[Footing],
+    distances: DistanceTerms | None,
     W: np.ndarray,
     gamma: np.ndarray,
 ) -> Kept:
@@ -99,6 +101,7 @@ def stand(
         L: (n, n) Cholesky factor of the inertia.
         limits: Joint limits.
         touches: The contacts.
+        distances: Distances that may shrink only so fast; None for none.
         W: (n, n) metric of the tasks.
         gamma: (n,) M q̈* of the law, N·m.
 
@@ -117,8 +120,11 @@ def stand(
     )
     keeps = limits if rules.limits is not None and rules.limits.law.bound else []
     room = k.torque_limit if rules.keep_torque else np.full(k.v.size, np.inf)
-    bounds = Bounds(keeps, k.M, k.bias, room)
-    found = realise(wish, carrying, Room(bounds.lower, bounds.upper, room))
+    bounds = Bounds(keeps, k.M, k.bias, room, distances)
+    apart = (np.zeros((0, k.v.size)), NOTHING, NOTHING)
+    if distances is not None:
+        apart = (distances.G, distances.most, distances.softness(k.M))
+    found = realise(wish, carrying, Room(bounds.lower, bounds.upper, room, *apart))
     if rules.observer is not None:
         rules.observer.remember(k.t, k.v, found.acceleration)
     weight = float(np.linalg.norm(k.robot.gravity[:3]))
@@ -126,9 +132,13 @@ def stand(
     status = _status(found, lost, touches)
     if bounds.lost(found.acceleration):
         status |= Status.LIMIT_LOST
+    if np.any(found.rows > 0.0):
+        status |= Status.COLLISION
+    if found.projected and bounds.will_close(found.acceleration):
+        status |= Status.COLLISION_LOST
     names = acting(bounds.terms, found.upper, found.lower)
     told = _told(touches, sets, found.forces)
-    return Kept(found.tau, status, names, contacts=told, hindrance=lost / MAY_GIVE_UP)
+    return Kept(found.tau, status, names, found.rows, told, lost / MAY_GIVE_UP)
 
 
 def entering(touches: Sequence[Footing], L: np.ndarray) -> np.ndarray:

@@ -461,7 +461,7 @@ class Controller(ReferenceController):
         if not fits(members):
             self._laid_out = None
             return 0
-        if len(members) > standing.most:
+        if len(members) > standing.most or self._distances > standing.distances:
             standing = self._standing = self._contacts_of(self._axes, len(members))
             self._laid_out = None
         waits = standing.begin(members, self.robot, t)
@@ -479,7 +479,12 @@ class Controller(ReferenceController):
         asked = self.torque_limits == "priority"
         room = np.array(self.robot.torque_limit) if asked else np.full(axes.v.size, np.inf)
         room[: self._base] = np.inf
-        return PackedContacts(axes, max(known, ROOM_FOR), room)
+        return PackedContacts(axes, max(known, ROOM_FOR), room, self._distances)
+
+    @property
+    def _distances(self) -> int:
+        """How many distances there are to keep now."""
+        return 0 if self._collisions is None else len(self._collisions.layout().rows)
 
     def _planned(self, members: tuple[Member, ...], axes: MotionAxes) -> Plan:
         return self._plan_of(members, axes, self._standing)

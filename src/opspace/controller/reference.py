@@ -127,7 +127,7 @@ class ReferenceController:
         check_drivable(robot)
         self._base = base_of(robot)
         if self._base:
-            singularity = _singularity_of_base(robot, bias, gravity, collisions, singularity)
+            singularity = _singularity_of_base(robot, bias, gravity, singularity)
         if stack.limits is not None:
             Profile(stack.limits.profile)
         self._robot, self._stack = robot, stack
@@ -506,7 +506,6 @@ def _singularity_of_base(
     robot: Robot,
     bias: str,
     gravity: str,
-    collisions: CollisionAvoidance | None,
     singularity: Singularity | None,
 ) -> Singularity | None:
     """Refuse what does not go with a floating base, and tell what stands for the default buffer."""
@@ -514,10 +513,6 @@ def _singularity_of_base(
         raise InputError(
             f"robot {robot.name!r} has a floating base: nothing holds its weight but contacts, "
             "so it takes bias='joint' and gravity='controller'"
-        )
-    if collisions is not None:
-        raise InputError(
-            f"robot {robot.name!r} has a floating base, whose controller does not keep distances yet"
         )
     return None if singularity is DEFAULT_SINGULARITY else singularity
 

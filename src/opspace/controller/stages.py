@@ -201,7 +201,8 @@ def tick(k: Given) -> Answer | None:
         gamma, info = law(k, L, mixed, tasks, above)
         distances = measure_distances(k)
         if k.base:
-            kept = stand(k, L, limits, touches, metric_of(without_rest(L, tasks), k.v.size), gamma)
+            metric = metric_of(without_rest(L, tasks), k.v.size)
+            kept = stand(k, L, limits, touches, distances, metric, gamma)
         else:
             kept = keep_bounds(k, L, limits, distances, tasks, torque(k, gamma))
     except (InputError, np.linalg.LinAlgError):
@@ -403,7 +404,7 @@ def torque(k: Given, gamma: np.ndarray) -> np.ndarray:
 def measure_distances(k: Given) -> DistanceTerms | None:
     """How far bodies are apart that must not touch, and how fast each distance may shrink."""
     guard = k.rules.guard
-    return None if guard is None else distance_terms(guard, k.robot, k.t)
+    return None if guard is None else distance_terms(guard, k.robot, k.t, k.torque_limit)
 
 
 def keep_bounds(

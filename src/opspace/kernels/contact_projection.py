@@ -20,6 +20,7 @@ from opspace.kernels.algebra import (
 )
 from opspace.kernels.compiled_scalars import entering_weight
 from opspace.kernels.contact_rows import close_contacts
+from opspace.kernels.distances import faster, row_softness
 from opspace.kernels.inertia import acceleration_of, torque_of
 from opspace.kernels.projection import task_metric
 from opspace.kernels.stance_columns import (
@@ -30,6 +31,7 @@ from opspace.kernels.stance_columns import (
     PLACE_ROWS,
 )
 from opspace.law.scalars import (
+    BROKEN,
     HARD,
     LEAST_REGULAR,
     MOTOR_SOFT,
@@ -61,11 +63,27 @@ def nearest_with_forces(work, stacks, closings):
     size = free + stance.rows[0]
     rank = _equations(work, free, size)
     count = _bounds(work, free, size, rank)
-    z = stance.bounds.z
+    z, n = stance.bounds.z, work.v.shape[0]
     for b in range(size - rank):
         z[b] = 0.0
-    clean_again(count, size - rank, stance)
-    _go(work, free, size, rank)
+    for i in range(work.distances.held.shape[0]):
+        work.distances.held[i] = 0
+    for a in range(n):
+        stance.trial[a] = work.joint_acceleration[a]
+    count = _take_in(work, free, size, rank, count)
+    while True:
+        clean_again(count, size - rank, stance)
+        _point(stance, size, rank)
+        for a in range(n):
+            stance.trial[a] = work.joint_acceleration[a]
+        for k in range(free):
+            for a in range(n):
+                stance.trial[a] += stance.row[k] * stance.accelerations[k, a]
+        before = count
+        count = _take_in(work, free, size, rank, count)
+        if count == before:
+            break
+    _go(work, free)
 
 
 @jit
@@ -225,6 +243,35 @@ def _bounds(work, free, size, rank):
 
 
 @jit
+def _take_in(work, free, size, rank, count):
+    """Append the distances that shrink faster at ``trial`` than they may; ``row`` is then overwritten.
+
+    Returns:
+        How many bounds there are then.
+    """
+    stance, d, n = work.stance, work.distances, work.v.shape[0]
+    first = 4 * n + EACH * stance.place.shape[0]
+    for i in range(d.held.shape[0]):
+        most = d.most[i]
+        over = faster(d, i, stance.trial) - most
+        if d.held[i] != 0 or not over > -BROKEN * max(1.0, abs(most)):
+            continue
+        if first + i >= stance.bounds.taken.shape[0]:
+            continue  # an obstacle of this very moment, for which the next tick has room
+        d.held[i] = 1
+        for b in range(size):
+            stance.row[b] = 0.0
+        for k in range(free):
+            stance.row[k] = faster(d, i, stance.accelerations[k])
+        room = most - faster(d, i, work.joint_acceleration)
+        softness = row_softness(work.inertia, d, i)
+        if softness == math.inf:
+            continue
+        count = _two_sided(stance, count, first + i, 0, -math.inf, room, softness, size, rank)
+    return count
+
+
+@jit
 def _cone(stance, c, owner, free, size, rank, count):
     """Rows of a cone, and of the largest force."""
     row, first, rows = stance.row, stance.place[c, PLACE_FIRST], stance.place[c, PLACE_ROWS]
@@ -277,9 +324,9 @@ def _two_sided(stance, count, owner, other, least, most, softness, size, rank):
 
 
 @jit
-def _go(work, free, size, rank):
-    """Take the point that was found back to motion, torque and forces."""
-    stance, y, n = work.stance, work.stance.row, work.v.shape[0]
+def _point(stance, size, rank):
+    """Take the point that was found back to the coordinates y, into ``row``."""
+    y = stance.row
     for b in range(BASE_SIZE):
         y[b] = stance.start[b]
     for i in range(rank, BASE_SIZE):
@@ -288,6 +335,12 @@ def _go(work, free, size, rank):
     for b in range(BASE_SIZE, size):
         y[b] = stance.bounds.y[b - rank]
     apply_reflectors(stance.E, BASE_SIZE, size, stance.scale, y)
+
+
+@jit
+def _go(work, free):
+    """Move motion, torque and forces by the coordinates in ``row``."""
+    stance, y, n = work.stance, work.stance.row, work.v.shape[0]
     change = work.change
     for a in range(n):
         change[a] = 0.0

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import math
 
-from opspace.kernels.compiled_scalars import closing_command, last_closing_command
+from opspace.kernels.compiled_scalars import closing_command, last_closing_command, yielding
+from opspace.kernels.inertia import acceleration_of, whiten
+from opspace.kernels.mesh_distance import from_mesh
 from opspace.kernels.motion import cross_add, move_joints
-from opspace.law.scalars import LOST, NO_DISTANCE, ROUNDED
+from opspace.law.scalars import LOST, NO_DISTANCE, ROUNDED, SOFT
 from opspace.machine.jit import jit
 
 MARGIN, K1, K2, BRAKE = range(4)
@@ -84,7 +86,11 @@ def _place_set(work, d, i):
 def _bound(work, d, i, ball, of):
     """One row: ρ with its direction, its rate, and what bounds its second derivative."""
     x, m, extent = d.set_axes[of], d.set_motion[of], d.extent[of]
-    rho, nx, ny, nz = _from_box(x, extent, ball)
+    faces = d.mesh[of, 1]
+    if faces > 0:
+        rho, nx, ny, nz = from_mesh(x, d.face, d.mesh[of, 0], faces, ball)
+    else:
+        rho, nx, ny, nz = _from_box(x, extent, ball)
     px, py, pz = ball[0], ball[1], ball[2]
     wx, wy, wz = m[3], m[4], m[5]
     bx, by, bz = m[0] + wy * pz - wz * py, m[1] + wz * px - wx * pz, m[2] + wx * py - wy * px
@@ -95,7 +101,9 @@ def _bound(work, d, i, ball, of):
     ay = ball[7] - m[7] - (m[11] * px - m[9] * pz) - (wz * ux - wx * uz)
     az = ball[8] - m[8] - (m[9] * py - m[10] * px) - (wx * uy - wy * ux)
     rate, drift = nx * vx + ny * vy + nz * vz, nx * ax + ny * ay + nz * az
-    curved = _curved(x, extent, rho, nx, ny, nz, vx - rate * nx, vy - rate * ny, vz - rate * nz)
+    curved = 0.0
+    if faces == 0:
+        curved = _curved(x, extent, rho, nx, ny, nz, vx - rate * nx, vy - rate * ny, vz - rate * nz)
     work.distance[i] = rho - d.ball[d.row[i, 0], 3] - extent[6]
     share, own = d.share[of], rate
     if share > 0.0:
@@ -207,3 +215,18 @@ def faster(d, i, x):
     for a in range(x.shape[0]):
         total += d.G[i, a] * x[a]
     return total
+
+
+@jit
+def row_softness(inertia, d, i):
+    """How soft the bound of row i is; see `opspace.law.nearest.softness_of_rows`."""
+    way = d.way
+    for a in range(way.shape[0]):
+        way[a] = d.G[i, a]
+    whiten(inertia, way)
+    acceleration_of(inertia, way)
+    square = 0.0
+    for a in range(way.shape[0]):
+        if way[a] != 0.0:
+            square += (way[a] * d.motors[a]) ** 2
+    return SOFT + yielding(d.most[i], math.sqrt(square), d.limits[BRAKE])

@@ -6,7 +6,7 @@ import math
 
 from opspace.kernels.algebra import cholesky, cholesky_row, solve_lower, solve_lower_transposed
 from opspace.kernels.compiled_scalars import level_weight
-from opspace.kernels.distances import faster
+from opspace.kernels.distances import faster, row_softness
 from opspace.kernels.inertia import acceleration_of, unit_row, whiten, whitened_of
 from opspace.kernels.walk import slot_bit
 from opspace.law.scalars import BROKEN, CLEANINGS, HARD, ROUNDING, SOFT, UNBOUNDED
@@ -111,8 +111,11 @@ def _take_in(inertia, acceleration, count, n, bounds, distances):
         for a in range(n):
             bounds.row[a] = distances.G[i, a]
         whiten(inertia, bounds.row)
+        softness = row_softness(inertia, distances, i)
+        if softness == math.inf:
+            continue
         # The second side is free.
-        count = _two_sided(count, n, 4 * n + i, -math.inf, most, SOFT, bounds)
+        count = _two_sided(count, n, 4 * n + i, -math.inf, most, softness, bounds)
     return count
 
 

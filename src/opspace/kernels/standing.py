@@ -9,10 +9,11 @@ from opspace.kernels.algebra import cholesky, solve_lower, solve_lower_transpose
 from opspace.kernels.columns import LIMIT_BOUND
 from opspace.kernels.contact_projection import nearest_with_forces
 from opspace.kernels.contact_rows import take_rows
+from opspace.kernels.distances import approach, will_close
 from opspace.kernels.inertia import acceleration_of, torque_of
 from opspace.kernels.limit_columns import MARGIN, SIGN
 from opspace.kernels.limit_rows import find_bounds, find_excess, will_pass
-from opspace.kernels.stance_columns import BASE_SIZE, NORMAL, PLACE_FIRST, PLACE_ROWS
+from opspace.kernels.stance_columns import BASE_SIZE, EACH, NORMAL, PLACE_FIRST, PLACE_ROWS
 from opspace.law.scalars import (
     BARELY,
     BROKEN,
@@ -28,6 +29,8 @@ from opspace.machine.jit import jit
 
 FILTERED = int(Status.FILTERED)
 SCALED = int(Status.TORQUE_SCALED)
+COLLISION = int(Status.COLLISION)
+COLLISION_LOST = int(Status.COLLISION_LOST)
 LIMIT_LOST = int(Status.LIMIT_LOST)
 GIVEN_UP = int(Status.GIVEN_UP)
 NOT_BALANCED = int(Status.NOT_BALANCED)
@@ -38,7 +41,7 @@ def stand(work, stacks, closings):
     """Share the forces for what the law wants, and take the nearest motion that forces allow.
 
     Reads u (n,) √J/s; writes tau (n,) N·m, joint_acceleration (n,) rad/s², limit_h of the limits that
-    act, contact_force, contact_use and hindrance.
+    act, distance_taken (distances,) m/s², contact_force, contact_use and hindrance.
 
     Args:
         work: `opspace.plan.records.TICK`.
@@ -62,6 +65,8 @@ def stand(work, stacks, closings):
     torque_with(work)
     for a in range(BASE_SIZE):
         stance.given_up[a] = 0.0
+    for i in range(work.distance_taken.shape[0]):
+        work.distance_taken[i] = 0.0
     bits = 0
     if not (_balanced(work) and _kept(work)):
         bits = FILTERED
@@ -183,9 +188,11 @@ def _balanced(work):
 
 @jit
 def _kept(work):
-    """Whether joints, motors and cones are kept."""
+    """Whether joints, motors, distances and cones are kept."""
     stance, n = work.stance, work.v.shape[0]
     x, lower, upper = work.joint_acceleration, work.bounds.lower, work.bounds.upper
+    if approach(work) > BROKEN:
+        return False
     for a in range(n):
         above = x[a] <= upper[a] + BROKEN * max(1.0, abs(upper[a]))
         if not (above and x[a] >= lower[a] - BROKEN * max(1.0, abs(lower[a]))):
@@ -216,8 +223,8 @@ def edge(stance, c, k):
 
 @jit
 def _acting(work):
-    """Tell how much each joint limit acts, and whether a motor does."""
-    taken, n = work.stance.bounds.taken, work.v.shape[0]
+    """Tell how much joint limits and distances act, and whether a motor does."""
+    taken, n, bits = work.stance.bounds.taken, work.v.shape[0], 0
     for i in range(work.limit.shape[0]):
         j = work.limit_joint[i]
         if work.option[LIMIT_BOUND] != 0.0:
@@ -226,8 +233,16 @@ def _acting(work):
                 work.limit_h[i] = min(part / work.limit[i, MARGIN], 1.0)
     for a in range(2 * n, 4 * n):
         if taken[a] > 0.0:
-            return SCALED
-    return 0
+            bits |= SCALED
+    first = 4 * n + EACH * work.stance.place.shape[0]
+    for i in range(work.distance_taken.shape[0]):
+        if first + i < taken.shape[0]:
+            work.distance_taken[i] = taken[first + i]
+            if taken[first + i] > 0.0:
+                bits |= COLLISION
+    if will_close(work):
+        bits |= COLLISION_LOST
+    return bits
 
 
 @jit

@@ -92,11 +92,11 @@ def tick(t, work):
             limit_stacks = limit_corners(work)
     evaluate_contacts(work)
     closings = law(work, stacks, limit_stacks)
+    measure_distances(work)
     if work.option[BASE] != 0.0:
         kept = stand(work, stacks, closings)
     else:
         torque(work)
-        measure_distances(work)
         kept = keep_bounds(work, stacks)
     if not _finite(work.tau):
         return NOT_FINITE

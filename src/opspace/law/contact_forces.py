@@ -89,11 +89,18 @@ class Room(NamedTuple):
         lower: (n,) least accelerations, -inf where there is none, rad/s².
         upper: (n,) largest accelerations, rad/s².
         torque: (n,) what the motors give, inf where they are not asked, N·m.
+        combined: (k, n) combinations of accelerations that are bounded, as those with which distances
+            shrink.
+        most: (k,) their bounds.
+        give_way: (k,) their softness, see `opspace.law.nearest.softness_of_rows`.
     """
 
     lower: Float[np.ndarray, " n"]
     upper: Float[np.ndarray, " n"]
     torque: Float[np.ndarray, " n"]
+    combined: Float[np.ndarray, "k n"]
+    most: Float[np.ndarray, " k"]
+    give_way: Float[np.ndarray, " k"]
 
 
 class Realised(NamedTuple):
@@ -107,6 +114,7 @@ class Realised(NamedTuple):
         upper: (n,) by how much each upper bound acts on its joint, 0 where it does not.
         lower: (n,) the same of the lower bounds.
         motors: Whether a bound on a torque acts.
+        rows: (k,) by how much each bound on a combination of accelerations lowers it.
         projected: Whether anything had to be given up or kept at all.
     """
 
@@ -117,6 +125,7 @@ class Realised(NamedTuple):
     upper: Float[np.ndarray, " n"]
     lower: Float[np.ndarray, " n"]
     motors: bool
+    rows: Float[np.ndarray, " k"]
     projected: bool
 
 
@@ -189,7 +198,7 @@ def realise(wish: Wish, sets: Sequence[ForceSet], room: Room) -> Realised:
 
         min ‖Lᵀ(q̈ − q̈*)‖²_W + e Σ ‖λ_c − λ*_c‖²_R + Σ excess²/softness
         J_held q̈ = J_held q̈*,   (A q̈ + b)[base] = Σ (J_cᵀ λ_c)[base],   λ_c ∈ h_c K_c
-        lower <= q̈ <= upper,   |τ| <= room,   τ = (A q̈ + b − Σ J_cᵀ λ_c)[joints]
+        lower <= q̈ <= upper,   combined q̈ <= most,   |τ| <= room,   τ = (A q̈ + b − Σ J_cᵀ λ_c)[joints]
 
     Where what is wanted keeps everything it is the answer, to the last bit.
 
@@ -208,11 +217,12 @@ def realise(wish: Wish, sets: Sequence[ForceSet], room: Room) -> Realised:
     tau = pull + wish.bias - J.T @ forces
     here = _State(wish.acceleration, forces, tau)
     limits = _limits(sets, room, base)
-    none = np.zeros(n)
+    none, nothing = np.zeros(n), np.zeros(room.most.size)
     if _balanced(tau[:base], pull + wish.bias) and limits.kept(here):
         tau[:base] = 0.0
+        unchanged = list(wish.forces)
         return Realised(
-            tau, wish.acceleration, list(wish.forces), none[:base], none, none, False, False
+            tau, wish.acceleration, unchanged, none[:base], none, none, False, nothing, False
         )
     change = _changes(wish, sets, J)
     start, basis = _solutions(change.tau[:base], -tau[:base])
@@ -228,8 +238,8 @@ def realise(wish: Wish, sets: Sequence[ForceSet], room: Room) -> Realised:
     tau = pull + wish.L @ (wish.L.T @ (change.acceleration @ y)) + wish.bias - J.T @ forces
     tau = np.concatenate([np.zeros(base), np.clip(tau, -room.torque, room.torque)[base:]])
     ends = np.cumsum([one.metric.size for one in sets])[:-1]
-    cones = taken.size - 4 * n
-    upper, lower, motors = np.split(taken[cones:], [n, 2 * n])
+    cones = taken.size - 4 * n - room.most.size
+    upper, lower, motors, apart = np.split(taken[cones:], [n, 2 * n, 4 * n])
     given_up = (wish.L @ (wish.L.T @ (acceleration - wish.acceleration)))[:base]
     return Realised(
         tau,
@@ -239,6 +249,7 @@ def realise(wish: Wish, sets: Sequence[ForceSet], room: Room) -> Realised:
         upper,
         lower,
         bool(np.any(motors)),
+        apart,
         True,
     )
 
@@ -260,13 +271,15 @@ class _Limits(NamedTuple):
 
     def values(self, at: _State) -> Float[np.ndarray, "j ..."]:
         """Give what is bounded, of a state or of its changes."""
+        apart = self.room.combined @ at.acceleration
         return np.concatenate(
-            [self.cones @ at.forces, at.acceleration, -at.acceleration, at.tau, -at.tau]
+            [self.cones @ at.forces, at.acceleration, -at.acceleration, at.tau, -at.tau, apart]
         )
 
     def most(self) -> Float[np.ndarray, " j"]:
         room = self.room
-        return np.concatenate([self.bounds, room.upper, -room.lower, room.torque, room.torque])
+        motors = room.torque, room.torque
+        return np.concatenate([self.bounds, room.upper, -room.lower, *motors, room.most])
 
     def kept(self, at: _State) -> bool:
         """Tell whether a state keeps everything, forces in parts of what is pressed."""
@@ -280,7 +293,8 @@ class _Limits(NamedTuple):
         """Give rows, bounds and softness for changes of a state."""
         n = at.tau.size
         soft = [HARD] * self.bounds.size + [SOFT] * (2 * n) + [MOTOR_SOFT] * (2 * n)
-        return self.values(change), self.most() - self.values(at), np.array(soft)
+        softness = np.concatenate([soft, self.room.give_way])
+        return self.values(change), self.most() - self.values(at), softness
 
 
 def _limits(sets: Sequence[ForceSet], room: Room, base: int) -> _Limits:

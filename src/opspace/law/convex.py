@@ -1,7 +1,8 @@
 """Distances of points to convex sets that move, and bounds on how they change.
 
 A point, a segment, a box and a half-space are boxes whose sides have no length or no end; grown by a
-radius the first two are a ball and a capsule. So one projection serves all.
+radius the first two are a ball and a capsule. So one projection serves all but meshes, see
+`opspace.law.polyhedra`.
 """
 
 # jaxtyping leaves NumPy's type parameters open.
@@ -12,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float
 
+from opspace.law.polyhedra import Meshes, mesh_distance
 from opspace.law.scalars import NO_DISTANCE, ROUNDED
 
 
@@ -95,11 +97,35 @@ def box_distance(
     return distance, normal
 
 
+def set_distance(
+    point: Float[np.ndarray, "k 3"],
+    lower: Float[np.ndarray, "k 3"],
+    upper: Float[np.ndarray, "k 3"],
+    meshes: Meshes | None,
+) -> tuple[Float[np.ndarray, " k"], Float[np.ndarray, "k 3"]]:
+    """Signed distance of points to boxes and meshes, as `box_distance` gives it.
+
+    Args:
+        point: (k, 3) in the axes of the set, m.
+        lower: (k, 3) where a box begins, m.
+        upper: (k, 3) where it ends, m.
+        meshes: Which sets are meshes; None for none.
+    """
+    distance, normal = box_distance(point, lower, upper)
+    if meshes is None:
+        return distance, normal
+    for i, (first, count) in enumerate(meshes.place.tolist()):
+        if count:
+            distance[i], normal[i] = mesh_distance(point[i], meshes.face[first : first + count])
+    return distance, normal
+
+
 def distance_rows(
     points: Points,
     bodies: Bodies,
     lower: Float[np.ndarray, "k 3"],
     upper: Float[np.ndarray, "k 3"],
+    meshes: Meshes | None = None,
 ) -> DistanceRows:
     """Bound from below how distances of points to convex sets accelerate.
 
@@ -108,7 +134,8 @@ def distance_rows(
 
     n is the direction from the nearest point of the set to p. Seen from the body the set is fixed, and
     the distance to a convex set is a convex function: what the inequality leaves out is not negative,
-    and zero where the set is flat. Of a set that is a point it is known, |v_t|²/ρ, and counted.
+    and zero where the set is flat. Of a set that is a point it is known, |v_t|²/ρ, and counted; of a
+    mesh, whose edges a point passes one after another, nothing is counted.
 
     Where two bodies keep away from each other, each counts what its own points accelerate by. The
     acceleration of B at p is that of its nearest point, a_P, and what B's turning adds:
@@ -122,21 +149,25 @@ def distance_rows(
         bodies: The bodies B that the sets are fixed to.
         lower: (k, 3) where each set begins in the axes of its body, see `box_distance`, m.
         upper: (k, 3) where it ends, m.
+        meshes: Which of the sets are meshes; None for none.
 
     Returns:
         One row per point.
     """
     way = points.position - bodies.position
-    distance, n = box_distance(np.einsum("kji,kj->ki", bodies.rotation, way), lower, upper)
+    local = np.einsum("kji,kj->ki", bodies.rotation, way)
+    distance, n = set_distance(local, lower, upper, meshes)
     n = np.einsum("kij,kj->ki", bodies.rotation, n)
     linear, spin = bodies.velocity[:, :3], bodies.velocity[:, 3:]
     v = points.velocity - linear - np.cross(spin, way)
     carried = bodies.acceleration[:, :3] + np.cross(bodies.acceleration[:, 3:], way)
     a = points.acceleration - carried - np.cross(spin, np.cross(spin, way) + 2.0 * v)
     rate, drift = np.einsum("ki,ki->k", n, v), np.einsum("ki,ki->k", n, a)
-    local = np.stack([n, v - rate[:, None] * n])
-    n_axes, tangent = np.einsum("kji,skj->ski", bodies.rotation, local)
+    seen = np.stack([n, v - rate[:, None] * n])
+    n_axes, tangent = np.einsum("kji,skj->ski", bodies.rotation, seen)
     round_ = np.where(lower == upper, 1.0, np.minimum(np.abs(n_axes) / ROUNDED, 1.0))
+    if meshes is not None:
+        round_[meshes.place[:, 1] > 0] = 0.0
     curved = np.sum(round_ * tangent**2, axis=1) / np.maximum(distance, NO_DISTANCE)
     drift = drift + curved
     across = np.sum(np.cross(spin, n) ** 2, axis=1)

@@ -11,7 +11,15 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from opspace.law.hierarchy import Level, WhitenedTask
-from opspace.law.scalars import CLEANINGS, HARD, ROUNDING, SOFT, UNBOUNDED, level_weight
+from opspace.law.scalars import (
+    CLEANINGS,
+    HARD,
+    ROUNDING,
+    SOFT,
+    UNBOUNDED,
+    level_weight,
+    yielding,
+)
 
 
 class Nearest(NamedTuple):
@@ -141,13 +149,13 @@ def nearest_within(
         x: (n,).
         rows: (k, n); a row that is zero bounds nothing.
         bounds: (k,), those from `UNBOUNDED` on are none.
-        softness: (k,) above 0, of rows of unit length.
+        softness: (k,) above 0, of rows of unit length; what is infinitely soft bounds nothing.
 
     Returns:
         The point, (n,), and by how much each bound moved it along its row, (k,).
     """
     size = np.linalg.norm(rows, axis=1)
-    there = (bounds < UNBOUNDED) & (size > 0.0)
+    there = (bounds < UNBOUNDED) & (size > 0.0) & (softness < np.inf)
     taken = np.zeros(bounds.size)
     unit = rows[there] / size[there, None]
     for _ in range(CLEANINGS):
@@ -166,6 +174,7 @@ def nearest_acceleration(
     torque_upper: Float[np.ndarray, " n"],
     combined: Float[np.ndarray, "k n"] | None = None,
     most: Float[np.ndarray, " k"] | None = None,
+    give_way: Float[np.ndarray, " k"] | None = None,
 ) -> Nearest:
     """Find the acceleration within bounds that is nearest in a metric.
 
@@ -186,6 +195,7 @@ def nearest_acceleration(
         combined: (k, n) combinations of accelerations that are bounded, such as those with which
             distances shrink; None for none.
         most: (k,) their bounds, inf where there is none.
+        give_way: (k,) their softness, see `softness_of_rows`; None is `SOFT` for all.
 
     Returns:
         q̈ and what holds it.
@@ -200,13 +210,42 @@ def nearest_acceleration(
     if combined is not None and most is not None:
         rows = np.concatenate([rows, np.linalg.solve(C, combined.T).T])
         bounds = np.concatenate([bounds, most])
-        softness = np.concatenate([softness, np.full(most.size, SOFT)])
+        soft = np.full(most.size, SOFT) if give_way is None else give_way
+        softness = np.concatenate([softness, soft])
     taken = np.zeros(bounds.size)
     if not np.any((bounds < UNBOUNDED) & (np.linalg.norm(rows, axis=1) > 0.0)):
         return Nearest(acceleration, taken[:n], taken[:n], motors=False, rows=taken[4 * n :])
     z, taken = nearest_within(C.T @ acceleration, rows, bounds, softness)
     motors_act = bool(np.any(taken[2 * n : 4 * n]))
     return Nearest(np.linalg.solve(C.T, z), taken[:n], taken[n : 2 * n], motors_act, taken[4 * n :])
+
+
+def softness_of_rows(
+    combined: Float[np.ndarray, "k n"],
+    most: Float[np.ndarray, " k"],
+    M: Float[np.ndarray, "n n"],
+    motors: Float[np.ndarray, " n"],
+    brake: float,
+) -> Float[np.ndarray, " k"]:
+    """Say how soft bounds on combinations of accelerations are, by what motors can do about them.
+
+        reach = ‖diag(Γ̄) A⁻¹ Gᵀ‖,   softness = `SOFT` + `yielding`(most, reach, brake)
+
+    Args:
+        combined: (k, n) G.
+        most: (k,) their bounds, m/s².
+        M: (n, n) inertia A.
+        motors: (n,) largest torques Γ̄, N·m; inf where nobody says.
+        brake: With which distances can be counted on to stop shrinking, m/s².
+
+    Returns:
+        (k,) softness of the rows of unit length, inf where they bound nothing.
+    """
+    way = np.linalg.solve(M, combined.T).T
+    known = np.where(way == 0.0, 0.0, motors)
+    reach = np.linalg.norm(way * known, axis=1)
+    told = zip(most.tolist(), reach.tolist(), strict=True)
+    return np.array([SOFT + yielding(bound, r, brake) for bound, r in told])
 
 
 def excess(

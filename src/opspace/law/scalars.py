@@ -308,6 +308,43 @@ def last_closing_command(
     return left / SOON - share * towards * slope if left > 0.0 else command
 
 
+TINY = 1e-12
+"""What is smaller than another number by this is nothing beside it."""
+HOPEFUL = 0.25
+"""Part of the brake that every distance counts as asking for, so that one that nothing can change asks
+for too much, whatever its bound."""
+
+
+def yielding(most: float, reach: float, brake: float) -> float:
+    """Evaluate how much softer the bound of a distance is that motors cannot keep.
+
+        need = (√(most² + (2ε brake)²) − most) / 2,   4 max(0, need/reach − 1)²,   ε = `HOPEFUL`
+
+    need is what a bound below zero asks for, rounded off at zero. The softness is once continuously
+    differentiable and grows with the square of need/reach, so that what a bound moves goes to zero with
+    what motors can move.
+
+    Args:
+        most: The bound, m/s².
+        reach: How much motors can change about the distance, m/s²; inf where nobody says.
+        brake: With which distances can be counted on to stop shrinking, m/s².
+
+    Returns:
+        What is added to the softness of the row of unit length; inf where nothing changes the distance.
+    """
+    if reach == math.inf:
+        return 0.0
+    least = 2.0 * HOPEFUL * brake
+    # For a bound above zero the difference of two large numbers is avoided.
+    size = math.sqrt(most * most + least * least)
+    need = 0.5 * least * least / (size + most) if most > 0.0 else 0.5 * (size - most)
+    if need <= reach:
+        return 0.0
+    if reach <= TINY * need:
+        return math.inf
+    return 4.0 * (need / reach - 1.0) ** 2
+
+
 def stopping_command(
     d: float, towards: float, brake: float, most: float, k1: float, period: float
 ) -> float:

@@ -30,7 +30,7 @@ COLOR = (0.80, 0.52, 0.20, 0.55)
 PLANE = 0.9
 """Half the side of the piece of a half-space that is drawn, m."""
 
-_THIN = 0.005
+_THIN, _EDGE = 0.005, 0.004
 
 
 class Drawn:
@@ -59,6 +59,9 @@ class Drawn:
 def draw_obstacles(drawing: Canvas, there: Sequence[tuple[Obstacle, Placing]]) -> None:
     """Put obstacles into a picture."""
     for obstacle, placing in there:
+        if obstacle.faces.size:
+            _draw_edges(drawing, obstacle.faces, placing)
+            continue
         lower = np.where(np.isfinite(obstacle.lower), obstacle.lower, -PLANE)
         upper = np.where(np.isfinite(obstacle.upper), obstacle.upper, PLANE)
         if not math.isfinite(obstacle.lower[2]):
@@ -76,3 +79,15 @@ def draw_obstacles(drawing: Canvas, there: Sequence[tuple[Obstacle, Placing]]) -
         at = placing.position + middle
         mujoco.mjv_initGeom(geom, shape, size, at, placing.rotation.flatten(), color)
         drawing.scene.ngeom += 1
+
+
+def _draw_edges(drawing: Canvas, faces: np.ndarray, placing: Placing) -> None:
+    """Put the edges of a mesh into a picture."""
+    shape = mujoco.mjtGeom.mjGEOM_CAPSULE
+    corners = placing.position + faces[:, :3] @ placing.rotation.T
+    for start, end in zip(
+        corners.reshape(-1, 3), np.roll(corners, -1, 1).reshape(-1, 3), strict=True
+    ):
+        if tuple(start) < tuple(end):  # every edge belongs to two faces
+            geom = drawing.add(shape, start, _EDGE, COLOR)
+            mujoco.mjv_connector(geom, shape, _EDGE, start, end)

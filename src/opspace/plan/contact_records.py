@@ -23,7 +23,7 @@ _refresh = partial(Field, writer="refresh", lives="tick")
 _after = partial(Field, lives="tick")
 _kept = partial(Field, lives="kept")
 _EACH = f"{SOLE_ROWS} contacts"
-_BOUNDS = f"4 n + {4 * SOLE_ROWS + EACH} contacts"
+_BOUNDS = f"4 n + {4 * SOLE_ROWS + EACH} contacts + distances"
 _ALL = f"n + {SOLE_ROWS} contacts"
 
 STANCE = RecordTable(
@@ -76,6 +76,7 @@ STANCE = RecordTable(
     Field("sigma", (BASE_SIZE,), "singular values"),
     Field("start", (BASE_SIZE,), "shortest change that gives the base what it lacks"),
     Field("row", (_ALL,), "any row of coordinates"),
+    Field("trial", ("n",), "q̈ at a point that may not be the last", "rad/s²"),
     _kept("remembered", (1,), "bounds that held at the tick before", dtype=_INT),
     _kept("held", (_BOUNDS,), "which they were", dtype=_INT),
     _kept("pressed", (_BOUNDS,), "their multipliers", "√J/s"),
@@ -85,19 +86,23 @@ STANCE = RecordTable(
 )
 
 
-def make_stance(n: int, contacts: int, room: np.ndarray | None = None) -> Record:
+def make_stance(
+    n: int, contacts: int, room: np.ndarray | None = None, distances: int = 0
+) -> Record:
     """Make the memory for so many contacts of a robot with n coordinates.
 
     Args:
         n: Velocity coordinates.
         contacts: Contacts that can be there at once.
+        distances: Distances that can be kept at once.
         room: (n,) what the motors give where they are asked, N·m; None is without end.
     """
-    bounds = BOUNDS.make({"n": n + SOLE_ROWS * contacts, "distances": EACH * contacts})
+    apart = EACH * contacts + distances
+    bounds = BOUNDS.make({"n": n + SOLE_ROWS * contacts, "distances": apart})
     given: dict[str, np.ndarray | Record] = {"bounds": bounds}
     if room is not None:
         given["room"] = room
-    return STANCE.make({"n": n, "contacts": contacts}, given)
+    return STANCE.make({"n": n, "contacts": contacts, "distances": distances}, given)
 
 
 def no_stance() -> Record:

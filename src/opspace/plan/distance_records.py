@@ -22,6 +22,11 @@ DISTANCES = RecordTable(
     _plan("set_place", ("sets", 2), "body and joint of each set, −1 for none", dtype=_INT),
     _refresh("set_local", ("sets", 12), "its rotation on the body by columns, its position", "m"),
     _plan("extent", ("sets", 7), "where it begins and ends, and by how much it is grown", "m"),
+    _plan("mesh", ("sets", 2), "first of its faces, and how many; none of a box", dtype=_INT),
+    _plan(
+        "face", ("faces", 12), "three corners and the normal of each, in the axes of its set", "m"
+    ),
+    _plan("motors", ("n",), "what the motors give, inf where nobody says", "N·m", start=np.inf),
     _plan("share", ("sets",), "of what closes, for the robot; 0 where the set just goes on"),
     _refresh("twist", ("sets", 6), "motion of an obstacle at its origin", "m/s, rad/s"),
     _plan("row", ("distances", 2), "a ball and a set each", dtype=_INT),
@@ -31,5 +36,6 @@ DISTANCES = RecordTable(
     Field("G", ("distances", "n"), "by how much accelerations let each shrink faster"),
     Field("most", ("distances",), "how fast that may be", "m/s²"),
     Field("last", ("distances",), "how fast before it closes faster than it may", "m/s²"),
+    Field("way", ("n",), "what changes a distance"),
     Field("held", ("distances",), "whether the projection has taken it in", dtype=_INT),
 )

@@ -32,6 +32,7 @@ class Sizes(NamedTuple):
     corners: int
     balls: int = 0
     sets: int = 0
+    faces: int = 0
     distances: int = 0
     contacts: int = 0
     presses: int = 0

@@ -64,16 +64,18 @@ class PackedContacts:
         axes: The robot's arrays.
         most: Contacts that can be there at once.
         room: (n,) what the motors give where they are asked, N·m.
+        distances: Distances that can be kept at once.
 
     Attributes:
         most: The same.
+        distances: The same.
         record: The arrays, `STANCE`.
         footing: The contacts of the last tick.
     """
 
-    def __init__(self, axes: MotionAxes, most: int, room: np.ndarray) -> None:
-        self.most = most
-        self.record = make_stance(axes.v.size, most, room)
+    def __init__(self, axes: MotionAxes, most: int, room: np.ndarray, distances: int = 0) -> None:
+        self.most, self.distances = most, distances
+        self.record = make_stance(axes.v.size, most, room, distances)
         self.footing: tuple[ContactTick, ...] = ()
         self._axes = axes
         self._there: list[tuple[object, ...]] = []

@@ -47,7 +47,9 @@ class PackedDistances:
                 d.set_local[i, :9], d.set_local[i, 9:] = R.T.reshape(9), p
         d.extent[:, :3], d.extent[:, 3:6] = layout.lower, layout.upper
         d.extent[:, 6] = layout.set_radius
+        d.mesh[:], d.face[:] = layout.mesh, layout.face.reshape(-1, 12)
         d.share[:] = layout.share
+        d.motors[:] = tick.torque_limit
 
     @property
     def moving(self) -> bool:

@@ -127,6 +127,7 @@ class Plan:
             corners=blending.most_corners(len(self.variables)),
             balls=0 if layout is None else layout.ball_frame.size,
             sets=0 if layout is None else layout.set_frame.size,
+            faces=0 if layout is None else layout.face.shape[0],
             distances=0 if layout is None else len(layout.rows),
             contacts=0 if contacts is None else contacts.most,
             presses=len(presses),

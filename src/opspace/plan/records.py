@@ -35,6 +35,7 @@ SIZES = {
     "limits": "joint limits, sides counted",
     "balls": "balls of the robot that keep away from something",
     "sets": "convex sets that they keep away from",
+    "faces": "faces of those that are meshes",
     "distances": "pairs of a ball and a set",
     "contacts": "contacts that can be there at once, none of a robot that is bolted down",
     "presses": "force tasks",

@@ -14,6 +14,7 @@ import numpy as np
 from opspace.command import Distance
 from opspace.controller import ReferenceController
 from opspace.errors import OpspaceError, RecordingError
+from opspace.law.polyhedra import FACE_ROWS
 from opspace.record.format import Column
 from opspace.record.reader import Recording
 from opspace.robots.shapes import LinkCapsule
@@ -38,7 +39,8 @@ def about_collisions(guard: CollisionAvoidance) -> dict[str, Any]:
 
     Returns:
         ``margin``, m; ``shapes`` and ``pairs`` of links; ``obstacles`` by name: where the set begins and
-        ends in its own axes, null where it does not, by how much it is grown, m, and its share.
+        ends in its own axes, null where it does not, by how much it is grown, m, its faces where it is a
+        mesh, and its share.
     """
     return {
         "margin": guard.margin,
@@ -50,6 +52,7 @@ def about_collisions(guard: CollisionAvoidance) -> dict[str, Any]:
                 "lower": _finite(o.lower),
                 "upper": _finite(o.upper),
                 "radius": o.radius,
+                "faces": o.faces.tolist(),
                 "share": o.share,
                 "ignore": list(o.ignore),
             }
@@ -78,6 +81,7 @@ def recorded_obstacle(name: str, about: Mapping[str, Any]) -> Obstacle:
         name, (lower, upper), about["radius"], here, np.eye(3), np.zeros(6), about["ignore"]
     )
     found.share = float(about.get("share", 0.0))
+    found.faces = np.array(about.get("faces", ()), float).reshape(-1, FACE_ROWS, 3)
     return found
 
 

@@ -7,9 +7,12 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import numpy as np
 from pydantic import Field, model_validator
 
+from opspace.robots import load_robot
+from opspace.robots.shapes import LinkCapsule
 from opspace.scenario.fields import Checked, Entry, Number, listed, problem, shown
-from opspace.scenario.targets import Point, Quaternion
-from opspace.tasks import Ball, Box, Capsule, CollisionAvoidance, HalfSpace
+from opspace.scenario.references import as_reference, build_target, vectors
+from opspace.scenario.targets import Point, PostureTarget, Quaternion
+from opspace.tasks import Ball, Box, Capsule, CollisionAvoidance, ConvexMesh, HalfSpace, OtherRobot
 from opspace.tasks.obstacles import Obstacle
 from opspace.tasks.references.sample import Sample
 
@@ -21,6 +24,7 @@ NEEDED = {
     "ball": ("radius",),
     "capsule": ("radius", "length"),
     "box": ("size",),
+    "mesh": ("vertices",),
     "half-space": ("normal",),
 }
 """What each shape has beside its place."""
@@ -58,13 +62,16 @@ class Straight:
 class ObstacleEntry(Entry):
     """Something that the robot must not touch."""
 
-    shape: Literal["ball", "capsule", "box", "half-space"] = Field(description="what it is")
+    shape: Literal["ball", "capsule", "box", "mesh", "half-space"] = Field(description="what it is")
     radius: Positive | None = Field(default=None, description="of a ball or a capsule [m]")
     length: Positive | None = Field(
         default=None, description="of a capsule along its z axis, without its ends [m]"
     )
     size: Annotated[tuple[float, ...], Number("m", size=3, above=0.0)] | None = Field(
         default=None, description="sides of a box [m]"
+    )
+    vertices: list[Point] | None = Field(
+        default=None, description="points of which a mesh is the convex hull [m]"
     )
     normal: Annotated[tuple[float, ...], Number("1", size=3)] | None = Field(
         default=None, description="out of a half-space, towards where the robot may be"
@@ -80,7 +87,7 @@ class ObstacleEntry(Entry):
 
     @model_validator(mode="after")
     def _check_shape(self) -> Self:
-        for key in ("radius", "length", "size", "normal"):
+        for key in ("radius", "length", "size", "vertices", "normal"):
             needed = key in NEEDED[self.shape]
             if needed and getattr(self, key) is None:
                 raise problem(f"is needed for a {self.shape}", key)
@@ -99,7 +106,60 @@ class ObstacleEntry(Entry):
             return Capsule(*size, place, self.orientation, **given)
         if self.shape == "box":
             return Box(self.size or (), place, self.orientation, **given)
+        if self.shape == "mesh":
+            return ConvexMesh(self.vertices or (), place, self.orientation, **given)
         return HalfSpace(place, self.normal or (), **given)
+
+
+class OtherRobotEntry(Entry):
+    """Another robot in the workspace, which does not look out for this one."""
+
+    robot: str = Field(
+        description="name of a robot, or path of a .urdf or .xml file from the working directory"
+    )
+    position: Point = Field(description="where its base is [m]")
+    orientation: Quaternion = Field(
+        default=(1.0, 0.0, 0.0, 0.0), description="axes of its base, quaternion wxyz"
+    )
+    target: PostureTarget | None = Field(
+        default=None,
+        description="how its joints move, beginning in its reference posture; null is not at all",
+    )
+    ignore: list[str] = Field(default_factory=list, description="links that may touch it")
+
+    def build(self, name: str) -> OtherRobot:
+        """Make its links.
+
+        Args:
+            name: What the names of its links begin with.
+
+        Raises:
+            OpspaceError: A robot or numbers that cannot be used.
+        """
+        robot = load_robot(self.robot)
+        place = self.position, self.orientation
+        other = OtherRobot(robot, *place, name=name, ignore=self.ignore)
+        space = vectors(np.array(robot.q_reference))
+        course = as_reference(build_target(self.target, space), space)
+        start = course(0.0)
+        other.follow(start.x, start.v)  # which refuses numbers that do not fit
+        other.play(course)
+        return other
+
+
+class LinkCapsuleEntry(Entry):
+    """A capsule around a link, or a part of it."""
+
+    frame: str = Field(description="frame of the robot that it is fixed to")
+    start: Point = Field(description="centre of one end in the axes of the frame [m]")
+    end: Point = Field(description="centre of the other end; the same makes a ball [m]")
+    radius: Positive = Field(description="radius [m]")
+
+    def build(self) -> LinkCapsule:
+        """Make it."""
+        x, y, z = self.start
+        u, v, w = self.end
+        return LinkCapsule(self.frame, (x, y, z), (u, v, w), self.radius)
 
 
 class CollisionsEntry(Entry):
@@ -114,17 +174,29 @@ class CollisionsEntry(Entry):
     pairs: Annotated[Any, Checked(_pairs)] = Field(
         default="auto", description="links that are kept apart: auto, none, or pairs of frames"
     )
+    shapes: list[LinkCapsuleEntry] | None = Field(
+        default=None, description="capsules of links; null fits them to the robot's own geometry"
+    )
     obstacles: dict[str, ObstacleEntry] = Field(
         default_factory=dict, description="name: what is in the workspace"
+    )
+    others: dict[str, OtherRobotEntry] = Field(
+        default_factory=dict, description="name: another robot in the workspace"
     )
 
     def build(self) -> CollisionAvoidance:
         """Make the guard.
 
         Raises:
-            InputError: A number that cannot be used.
+            OpspaceError: A robot or a number that cannot be used.
         """
         obstacles = [entry.build(name) for name, entry in self.obstacles.items()]
+        for name, other in self.others.items():
+            obstacles.extend(other.build(name).obstacles)
         return CollisionAvoidance(
-            *obstacles, margin=self.margin, brake=self.brake, pairs=self.pairs
+            *obstacles,
+            margin=self.margin,
+            shapes="model" if self.shapes is None else [shape.build() for shape in self.shapes],
+            brake=self.brake,
+            pairs=self.pairs,
         )

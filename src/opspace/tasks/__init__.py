@@ -19,6 +19,7 @@ from opspace.tasks.kinds import TaskKind
 from opspace.tasks.obstacles import Ball as Ball
 from opspace.tasks.obstacles import Box as Box
 from opspace.tasks.obstacles import Capsule as Capsule
+from opspace.tasks.obstacles import ConvexMesh as ConvexMesh
 from opspace.tasks.obstacles import HalfSpace as HalfSpace
 from opspace.tasks.orientation import OrientationTask as OrientationTask
 from opspace.tasks.other_robot import OtherRobot as OtherRobot

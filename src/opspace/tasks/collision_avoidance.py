@@ -137,7 +137,8 @@ class CollisionAvoidance:
         for obstacle in obstacles:
             if not isinstance(obstacle, Obstacle):
                 raise InputError(
-                    f"a guard takes Ball, Box, Capsule and HalfSpace, not {type(obstacle).__name__}"
+                    "a guard takes Ball, Box, Capsule, ConvexMesh and HalfSpace, not "
+                    f"{type(obstacle).__name__}"
                 )
             if obstacle.name in names:
                 raise InputError(f"there is an obstacle {obstacle.name!r} already")

@@ -11,6 +11,7 @@ from types import MappingProxyType
 import numpy as np
 
 from opspace.command import Distance
+from opspace.law.polyhedra import FACE_ROWS, Meshes
 from opspace.robots.protocol import Robot
 from opspace.robots.shapes import LinkCapsule
 from opspace.tasks.obstacles import Obstacle, Placing
@@ -33,6 +34,8 @@ class DistanceLayout:
         lower: (sets, 3) where each set begins in its own axes, m.
         upper: (sets, 3) where it ends, m.
         set_radius: (sets,) by how much it is grown, m.
+        mesh: (sets, 2) its first face and how many it has; none where it is a box.
+        face: (faces, 4, 3) corners and normal of each in the axes of its set, m.
         share: (sets,) see `Obstacle.share`; 0 for links.
         rows: (rows, 2) a ball and a set each.
         pairs: Names of the pairs of bodies, "body/body".
@@ -49,10 +52,16 @@ class DistanceLayout:
     lower: np.ndarray
     upper: np.ndarray
     set_radius: np.ndarray
+    mesh: np.ndarray
+    face: np.ndarray
     share: np.ndarray
     rows: np.ndarray
     pairs: tuple[str, ...]
     pair: np.ndarray
+
+    def meshes_of(self, sets: np.ndarray) -> Meshes | None:
+        """Say which of some sets are meshes; None where there is no mesh at all."""
+        return Meshes(self.mesh[sets], self.face) if self.face.size else None
 
     def placings(self, t: float) -> tuple[Placing, ...]:
         """Ask every obstacle where it is at time t, s."""
@@ -113,11 +122,20 @@ def lay_out(
         np.concatenate([-halves, np.array(lower).reshape(-1, 3)]),
         np.concatenate([halves, np.array(upper).reshape(-1, 3)]),
         np.array([*[s.radius for s in shapes], *[o.radius for o in obstacles]]),
+        *_meshes(len(shapes), obstacles),
         np.array([*[0.0] * len(shapes), *[o.share for o in obstacles]]),
         rows[:, :2],
         names,
         rows[:, 2],
     )
+
+
+def _meshes(links: int, obstacles: Sequence[Obstacle]) -> tuple[np.ndarray, np.ndarray]:
+    """Say where the faces of every set are in the list of all, and list them."""
+    count = np.array([0] * links + [o.faces.shape[0] for o in obstacles], np.int64)
+    first = np.cumsum(count) - count
+    faces = [np.zeros((0, FACE_ROWS, 3)), *(o.faces for o in obstacles)]
+    return np.column_stack([first, count]), np.concatenate(faces)
 
 
 def _rows(

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from opspace.law.convex import box_distance
+from opspace.law.convex import set_distance
 from opspace.robots.protocol import Robot
 from opspace.tasks.distance_layout import DistanceLayout
 from opspace.tasks.obstacles import Placing
@@ -43,7 +43,9 @@ def nearest_points(
     rotation, position = _sets(layout, robot, placings)
     balls, sets = layout.rows[:, 0], layout.rows[:, 1]
     R, way = rotation[sets], centre[balls] - position[sets]
-    rho, n = box_distance(np.einsum("kji,kj->ki", R, way), layout.lower[sets], layout.upper[sets])
+    local = np.einsum("kji,kj->ki", R, way)
+    meshes = layout.meshes_of(sets)
+    rho, n = set_distance(local, layout.lower[sets], layout.upper[sets], meshes)
     n = np.einsum("kij,kj->ki", R, n)
     apart = rho - layout.ball_radius[balls] - layout.set_radius[sets]
     start = centre[balls] - layout.ball_radius[balls, None] * n

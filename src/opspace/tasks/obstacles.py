@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from types import MappingProxyType
 from typing import Any, NamedTuple, cast
 
@@ -11,10 +11,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from opspace.errors import InputError
+from opspace.law.polyhedra import FACE_ROWS
+from opspace.tasks.hulls import hull_faces
 from opspace.tasks.references.sample import Reference, Sample
 from opspace.tasks.rotation import as_rotation
 from opspace.tasks.task import CHANGES
-from opspace.tasks.validation import Array, finite_array, numbers, positive
+from opspace.tasks.validation import Array, finite, finite_array, numbers, positive
 from opspace.tasks.ways import Pace, VectorWay
 
 _NONE = np.zeros(3)
@@ -52,6 +54,8 @@ class Obstacle:
         lower: (3,) where the box begins in its own axes, m.
         upper: (3,) where it ends, m.
         radius: By how much it is grown, m.
+        faces: (f, 4, 3) of a mesh, three corners and the outward normal of each in its own axes, m; the
+            box is then around it. None of a box.
         share: Where it keeps away itself, the part of the speed at which the two may close that is left
             to the robot, below 1; 0 where it goes on as it moves, whatever comes.
     """
@@ -74,6 +78,7 @@ class Obstacle:
         self.ignore = tuple(ignore)
         self.lower, self.upper = np.array(extent[0], float), np.array(extent[1], float)
         self.radius = radius
+        self.faces = np.zeros((0, FACE_ROWS, 3))
         self.share = 0.0
         # One record, assigned once: a tick in another thread sees the old place or the new one.
         self._state = self._told(position, rotation, velocity, _NONE)
@@ -117,7 +122,12 @@ class Obstacle:
             return here
         begin = getattr(path, "begin_at", None)
         path = path if begin is None else begin(t)
-        sample = path(t)
+        sample: Any = path(t)
+        if isinstance(sample, Placing):
+            here = sample
+            if self._state is found:
+                self._state = here, path
+            return here
         speed = sample.v if np.size(sample.v) else _NONE
         here, _ = self._told(sample.x, here.rotation, speed, _NONE)
         if self._state is found:  # nobody has placed it meanwhile
@@ -152,6 +162,15 @@ class Obstacle:
             _STILL if velocity is None else velocity,
             here.position,
         )
+        CHANGES.last = object()
+
+    def follow(self, course: Callable[[float], Placing]) -> None:
+        """Let it go where something says that it is, turn and all, from the next tick on.
+
+        Args:
+            course: Gives the placing at a time, s.
+        """
+        self._state = self._state[0], course
         CHANGES.last = object()
 
     def lead(self, goal: ArrayLike, t: float) -> None:
@@ -293,6 +312,46 @@ class Box(Obstacle):
         if not np.all(half > 0.0):
             raise InputError(f"the size of {name!r} must be above zero, not {size!r}")
         super().__init__(name, (-half, half), 0.0, position, rotation, velocity, ignore)
+
+
+class ConvexMesh(Obstacle):
+    """The convex hull of points, grown by a radius.
+
+    A row costs more the more faces there are, so give a coarse hull.
+
+    Args:
+        vertices: (k, 3) in its own axes, m; at least four, not in one plane.
+        position: (3,) of the origin of these axes, m, or a reference in time.
+        rotation: Its axes, (3, 3) or quaternion wxyz.
+        radius: By how much it is grown, m.
+        velocity: (3,) or (6,), m/s and rad/s.
+        name: Its name.
+        ignore: Links that need not stay away from it.
+
+    Raises:
+        InputError: A number that cannot be used, or points without a volume.
+    """
+
+    def __init__(
+        self,
+        vertices: ArrayLike,
+        position: ArrayLike | Reference = _NONE,
+        rotation: ArrayLike = _UPRIGHT,
+        *,
+        radius: float = 0.0,
+        velocity: ArrayLike = _STILL,
+        name: str = "mesh",
+        ignore: Iterable[str] = (),
+    ) -> None:
+        points = numbers(vertices, f"the vertices of {name!r}")
+        faces = hull_faces(points, f"the vertices of {name!r}")
+        grown = finite(radius, f"the radius of {name!r}")
+        if grown < 0.0:
+            raise InputError(f"the radius of {name!r} must be at least 0, not {radius!r}")
+        corners = faces[:, :3].reshape(-1, 3)
+        extent = corners.min(axis=0), corners.max(axis=0)
+        super().__init__(name, extent, grown, position, rotation, velocity, ignore)
+        self.faces = faces
 
 
 class HalfSpace(Obstacle):

@@ -13,7 +13,8 @@ from opspace.robots.protocol import Robot
 from opspace.robots.shapes import LinkCapsule, shapes_of
 from opspace.tasks.collision_avoidance import wanted_shapes
 from opspace.tasks.distance_layout import along
-from opspace.tasks.obstacles import Ball, Capsule, Obstacle
+from opspace.tasks.obstacles import Ball, Capsule, Obstacle, Placing
+from opspace.tasks.references.sample import Reference
 from opspace.tasks.rotation import as_rotation
 from opspace.tasks.validation import finite, finite_array
 
@@ -91,18 +92,54 @@ class OtherRobot:
         Raises:
             InputError: A wrong size or a number that is not finite.
         """
+        robot = self._robot
+        placings = self._placings(
+            finite_array(q, (robot.nq,), "q"), finite_array(v, (robot.nv,), "v")
+        )
+        for obstacle, placing in zip(self.obstacles, placings, strict=True):
+            obstacle.place(placing.position, placing.rotation, placing.velocity)
+
+    def play(self, course: Reference) -> None:
+        """Let the links go as the robot does that follows a reference of its joints exactly.
+
+        Args:
+            course: Gives positions (n,) [rad] and velocities of its joints at a time.
+
+        Raises:
+            InputError: At a tick, what it gives is not (n,) or not finite; here, joints whose positions
+                have other coordinates than their velocities.
+        """
+        robot = self._robot
+        if robot.nq != robot.nv:
+            raise InputError(f"robot {robot.name!r} has joints that no reference of numbers moves")
+        last: tuple[float, list[Placing]] | None = None
+
+        def placings(t: float) -> list[Placing]:
+            nonlocal last
+            found = last
+            if found is None or found[0] != t:
+                sample = course(t)
+                q = finite_array(sample.x, (robot.nq,), "q of the course")
+                v = finite_array(sample.v, (robot.nv,), "v of the course")
+                found = last = t, self._placings(q, v)
+            return found[1]
+
+        for i, obstacle in enumerate(self.obstacles):
+            obstacle.follow(lambda t, i=i: placings(t)[i])
+
+    def _placings(self, q: np.ndarray, v: np.ndarray) -> list[Placing]:
+        """Where the capsules of the links are, and how they move."""
         robot, base = self._robot, self._rotation
-        robot.update(finite_array(q, (robot.nq,), "q"), finite_array(v, (robot.nv,), "v"))
-        links = zip(self.obstacles, self._frames, self._places, strict=True)
-        for obstacle, frame, (axes, middle, _) in links:
+        robot.update(q, v)
+        found: list[Placing] = []
+        for frame, (axes, middle, _) in zip(self._frames, self._places, strict=True):
             R, twist = robot.rotation(frame), robot.velocity(frame)
             arm = R @ middle
             linear = base @ (twist[:3] + np.cross(twist[3:], arm))
-            obstacle.place(
-                self._position + base @ (robot.position(frame) + arm),
-                base @ R @ axes,
-                np.concatenate([linear, base @ twist[3:]]),
-            )
+            position = self._position + base @ (robot.position(frame) + arm)
+            velocity = np.concatenate([linear, base @ twist[3:]])
+            found.append(Placing(base @ R @ axes, position, velocity))
+        return found
 
 
 def _obstacle(shape: LinkCapsule, length: float, name: str, ignore: tuple[str, ...]) -> Obstacle:

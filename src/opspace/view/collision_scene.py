@@ -153,7 +153,13 @@ class _Body:
 
 
 def _mesh(obstacle: Obstacle) -> trimesh.Trimesh:
-    """Draw a set: a box grown by a radius; of one without end a piece is drawn."""
+    """Draw a set: a box grown by a radius; of one without end a piece is drawn.
+
+    A mesh is drawn as it is before it is grown.
+    """
+    if obstacle.faces.size:
+        corners = obstacle.faces[:, :3].reshape(-1, 3)
+        return trimesh.Trimesh(corners, np.arange(len(corners)).reshape(-1, 3))
     lower = np.where(np.isfinite(obstacle.lower), obstacle.lower, -0.5 * PLANE)
     upper = np.where(np.isfinite(obstacle.upper), obstacle.upper, 0.5 * PLANE)
     if not math.isfinite(obstacle.lower[2]):
