@@ -10,12 +10,11 @@ import opspace as osc
 from tests.controller.collision_scenes import SCENES, SECONDS, run
 
 pytestmark = pytest.mark.slow
-# N·m per ms: the largest, and 99 of 100. A link's balls take over from each other with a kink. After the
-# ball has passed the wrist, three rows that are nearly one change places within 3 ms.
+# N·m per ms: the largest, and 99 of 100. A link's balls take over from each other with a kink.
 STEPS = {
     "table": (0.5, 0.3),
     "self_fold": (0.5, 0.3),
-    "moving_ball": (1.0, 0.4),
+    "moving_ball": (0.5, 0.4),
     "gap": (0.5, 0.3),
     "clutter": (3.0, 0.6),
 }

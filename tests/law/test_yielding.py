@@ -11,7 +11,7 @@ from opspace.kernels.inertia import factor
 from opspace.kernels.projection import nearest_acceleration as compiled
 from opspace.law import nearest_acceleration
 from opspace.law.nearest import softness_of_rows
-from opspace.law.scalars import SOFT, yielding
+from opspace.law.scalars import SOFT_APART, yielding
 from opspace.plan.distance_records import DISTANCES
 from opspace.plan.memory import make_inertia
 from opspace.plan.records import BOUNDS
@@ -102,7 +102,10 @@ def test_what_cannot_be_kept_does_not_take_the_other_bounds_with_it():
 
 def test_without_known_motors_all_rows_are_equally_hard():
     G, most = np.array([[1e-9, 0.0], [0.0, 1.0]]), np.array([-5.0, 1.0])
-    assert softness_of_rows(G, most, np.eye(2), np.full(2, np.inf), BRAKE).tolist() == [SOFT, SOFT]
+    assert softness_of_rows(G, most, np.eye(2), np.full(2, np.inf), BRAKE).tolist() == [
+        SOFT_APART,
+        SOFT_APART,
+    ]
     nothing = softness_of_rows(0.0 * G, most, np.eye(2), np.full(2, np.inf), BRAKE)
     assert nothing.tolist() == [np.inf, np.inf]
 

@@ -7,38 +7,45 @@ of multipliers that are not negative is a start from which each step comes neare
 from __future__ import annotations
 
 from opspace.kernels.projection import advance, multipliers
-from opspace.law.scalars import CLEANINGS, ROUNDING
+from opspace.law.scalars import ROUNDING
 from opspace.machine.jit import jit
 
 
 @jit
-def clean_again(count, n, stance):
-    """Project z several times, what softness leaves of an excess included.
+def begin_again(count, n, stance):
+    """Begin at z with the bounds that held, and nothing taken.
 
-    Args:
-        count: Number of bounds.
-        n: Size of z.
-        stance: `STANCE`; of its bounds z, normal, bound and softness are read, y and taken written.
+    Returns:
+        How many of them hold.
     """
     bounds = stance.bounds
-    size = _recall(count, stance)
     for a in range(n):
         bounds.x[a] = bounds.z[a]
     for a in range(bounds.taken.shape[0]):
         bounds.taken[a] = 0.0
-    known = 0
-    for turn in range(CLEANINGS):
-        size = _settle(count, n, known, size, stance)
-        known = size
-        for a in range(n):
-            bounds.x[a] = bounds.y[a]
-        for k in range(size):
-            i = bounds.active[k]
-            bounds.taken[bounds.owner[i]] += bounds.multiplier[i] * bounds.size[i]
-            if turn == 0:
-                stance.held[k], stance.pressed[k] = bounds.owner[i], bounds.multiplier[i]
+    return _recall(count, stance)
+
+
+@jit
+def go_on_from(turn, n, size, stance):
+    """Count what the bounds that hold take, and go on from the point that was found.
+
+    Args:
+        turn: How often it has been projected before; the first one is remembered.
+        n: Size of z.
+        size: How many hold.
+        stance: `STANCE`.
+    """
+    bounds = stance.bounds
+    for a in range(n):
+        bounds.x[a] = bounds.y[a]
+    for k in range(size):
+        i = bounds.active[k]
+        bounds.taken[bounds.owner[i]] += bounds.multiplier[i] * bounds.size[i]
         if turn == 0:
-            stance.remembered[0] = size
+            stance.held[k], stance.pressed[k] = bounds.owner[i], bounds.multiplier[i]
+    if turn == 0:
+        stance.remembered[0] = size
 
 
 @jit
@@ -64,7 +71,7 @@ def _recall(count, stance):
 
 
 @jit
-def _settle(count, n, known, size, stance):
+def settle(count, n, known, size, stance):
     """Find y = x less the normals times their multipliers, ``known`` of which are factored.
 
     Returns:

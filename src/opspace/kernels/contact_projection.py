@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 
-from opspace.kernels.active_set import clean_again
+from opspace.kernels.active_set import begin_again, go_on_from, settle
 from opspace.kernels.algebra import (
     apply_reflectors,
     apply_reflectors_transposed,
@@ -32,6 +32,7 @@ from opspace.kernels.stance_columns import (
 )
 from opspace.law.scalars import (
     BROKEN,
+    CLEANINGS,
     HARD,
     LEAST_REGULAR,
     MOTOR_SOFT,
@@ -71,19 +72,30 @@ def nearest_with_forces(work, stacks, closings):
     for a in range(n):
         stance.trial[a] = work.joint_acceleration[a]
     count = _take_in(work, free, size, rank, count)
-    while True:
-        clean_again(count, size - rank, stance)
-        _point(stance, size, rank)
-        for a in range(n):
-            stance.trial[a] = work.joint_acceleration[a]
-        for k in range(free):
-            for a in range(n):
-                stance.trial[a] += stance.row[k] * stance.accelerations[k, a]
-        before = count
-        count = _take_in(work, free, size, rank, count)
-        if count == before:
-            break
+    held, known = begin_again(count, size - rank, stance), 0
+    # Several times, what softness leaves of an excess included.
+    for turn in range(CLEANINGS):
+        while True:
+            held = settle(count, size - rank, known, held, stance)
+            known, before = held, count
+            _point(stance, size, rank)
+            _try(work, free)
+            count = _take_in(work, free, size, rank, count)
+            if count == before:
+                break
+        go_on_from(turn, size - rank, held, stance)
     _go(work, free)
+
+
+@jit
+def _try(work, free):
+    """Accelerations at the coordinates in ``row``, into ``trial``."""
+    stance = work.stance
+    for a in range(work.v.shape[0]):
+        stance.trial[a] = work.joint_acceleration[a]
+    for k in range(free):
+        for a in range(work.v.shape[0]):
+            stance.trial[a] += stance.row[k] * stance.accelerations[k, a]
 
 
 @jit
@@ -267,6 +279,7 @@ def _take_in(work, free, size, rank, count):
         softness = row_softness(work.inertia, d, i)
         if softness == math.inf:
             continue
+        stance.bounds.multiplier[count] = 0.0
         count = _two_sided(stance, count, first + i, 0, -math.inf, room, softness, size, rank)
     return count
 

@@ -8,7 +8,7 @@ from opspace.kernels.compiled_scalars import closing_command, last_closing_comma
 from opspace.kernels.inertia import acceleration_of, whiten
 from opspace.kernels.mesh_distance import from_mesh
 from opspace.kernels.motion import cross_add, move_joints
-from opspace.law.scalars import LOST, NO_DISTANCE, ROUNDED, SOFT
+from opspace.law.scalars import LOST, NO_DISTANCE, ROUNDED, SOFT_APART
 from opspace.machine.jit import jit
 
 MARGIN, K1, K2, BRAKE = range(4)
@@ -229,4 +229,4 @@ def row_softness(inertia, d, i):
     for a in range(way.shape[0]):
         if way[a] != 0.0:
             square += (way[a] * d.motors[a]) ** 2
-    return SOFT + yielding(d.most[i], math.sqrt(square), d.limits[BRAKE])
+    return SOFT_APART + yielding(d.most[i], math.sqrt(square), d.limits[BRAKE])

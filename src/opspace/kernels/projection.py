@@ -68,27 +68,22 @@ def nearest_acceleration(inertia, acceleration, bounds, distances):
     for i in range(distances.held.shape[0]):
         distances.held[i] = 0
     count = _take_in(inertia, acceleration, count, n, bounds, distances)
-    while True:
-        _clean(count, n, bounds)
-        for a in range(n):
-            acceleration[a] = bounds.y[a]
-        solve_lower_transposed(bounds.C, n, acceleration)
-        acceleration_of(inertia, acceleration)
-        before = count
-        count = _take_in(inertia, acceleration, count, n, bounds, distances)
-        if count == before:
-            break
-
-
-@jit
-def _clean(count, n, bounds):
-    """Project z several times, what softness leaves of an excess included."""
     for a in range(n):
         bounds.x[a] = bounds.z[a]
     for a in range(bounds.taken.shape[0]):
         bounds.taken[a] = 0.0
+    # Several times, what softness leaves of an excess included.
     for _ in range(CLEANINGS):
-        project_on_bounds(count, n, bounds)
+        while True:
+            project_on_bounds(count, n, bounds)
+            for a in range(n):
+                acceleration[a] = bounds.y[a]
+            solve_lower_transposed(bounds.C, n, acceleration)
+            acceleration_of(inertia, acceleration)
+            before = count
+            count = _take_in(inertia, acceleration, count, n, bounds, distances)
+            if count == before:
+                break
         for a in range(n):
             bounds.x[a] = bounds.y[a]
         for i in range(count):

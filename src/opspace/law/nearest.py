@@ -16,6 +16,7 @@ from opspace.law.scalars import (
     HARD,
     ROUNDING,
     SOFT,
+    SOFT_APART,
     UNBOUNDED,
     level_weight,
     yielding,
@@ -229,7 +230,7 @@ def softness_of_rows(
 ) -> Float[np.ndarray, " k"]:
     """Say how soft bounds on combinations of accelerations are, by what motors can do about them.
 
-        reach = ‖diag(Γ̄) A⁻¹ Gᵀ‖,   softness = `SOFT` + `yielding`(most, reach, brake)
+        reach = ‖diag(Γ̄) A⁻¹ Gᵀ‖,   softness = `SOFT_APART` + `yielding`(most, reach, brake)
 
     Args:
         combined: (k, n) G.
@@ -245,7 +246,7 @@ def softness_of_rows(
     known = np.where(way == 0.0, 0.0, motors)
     reach = np.linalg.norm(way * known, axis=1)
     told = zip(most.tolist(), reach.tolist(), strict=True)
-    return np.array([SOFT + yielding(bound, r, brake) for bound, r in told])
+    return np.array([SOFT_APART + yielding(bound, r, brake) for bound, r in told])
 
 
 def excess(

@@ -629,6 +629,10 @@ the part s keeps (ROOM_SOFT / (s + ROOM_SOFT))⁸ of its excess."""
 SOFT = 1e-7
 """How soft bounds on accelerations are; where they contradict each other or the motors, the excess is
 shared."""
+SOFT_APART = 1.5e-2
+"""How soft bounds on distances are: where rows of neighbouring balls are nearly one, the answer goes
+from one to the other over as much of their difference. What it leaves of an excess is cleaned away like
+that of the others; a distance that contradicts a joint limit or a motor gives way."""
 CLEANINGS = 3
 """How often the projection is made: each one starts from the answer of the one before, and what that
 left of an excess because its bounds are soft becomes smaller by their softness."""
