@@ -8,6 +8,10 @@ import pytest
 
 import opspace as osc
 from opspace.export import export
+from opspace.plots import plot_columns
+from opspace.runs.check import check_robot
+from opspace.runs.metrics import measure, units_of
+from opspace.runs.tables import joints_table, metrics_table, timeline_table
 
 NAMES = ("/arm/lift", "left/turn", "Gelenk drei ä", "j 4")
 ARM = """<mujoco><worldbody><body name="a"><joint name="{}" type="slide" axis="0 0 1" range="0 .5"/>
@@ -63,15 +67,33 @@ def test_odd_names_reach_every_format(recording, tmp_path):
     assert export(recording, tmp_path / "run.rrd").stat().st_size > 0
 
 
-def test_a_stop_and_a_check_say_newtons(recording, tmp_path):
-    from opspace.runs.check import check_robot
-    from opspace.runs.tables import joints_table
+def test_what_is_measured_of_a_run_has_both_units(recording, tmp_path):
+    """The largest of any joint may be one that turns or one that slides."""
+    found = units_of(recording)
+    assert (found["max_torque_step"], found["max_joint_speed"]) == ("N, N·m", "m/s, rad/s")
+    _, rows = metrics_table({"value": measure(recording)}, found)
+    written = {row[0]: row[-1] for row in rows}
+    assert written["max torque step"] == "N, N·m"
+    assert written["max joint speed"] == "m/s, rad/s"
+    assert timeline_table([], recording)[0][-1] == "largest torque step [N, N·m]"
+    robot = osc.load_robot(tmp_path / "arm.xml")
+    controller = osc.Controller(robot, osc.Stack([osc.JointLimits(), osc.PostureTask()]))
+    again = osc.replay(recording, controller)
+    assert (again.gap, again.unit) == (0.0, "N, N·m")
+    labels = [axes.get_ylabel() for axes in plot_columns({"run": recording}, ["tau"]).axes]
+    assert labels == ["joint force [N]", "joint torque [N·m]"]
 
+
+def test_a_stop_and_a_check_say_newtons(recording, tmp_path):
     robot = osc.load_robot(tmp_path / "arm.xml")
     rule = osc.StopRule(max_joint_speed=1.0, max_torque=1.0)
     assert rule.reason(robot, np.array([2.0, 0, 0, 0]), np.zeros(4)).endswith("at 2.0 m/s")
     assert rule.reason(robot, np.zeros(4), np.array([5.0, 0, 0, 0])).endswith("asked for 5 N")
     assert rule.reason(robot, np.zeros(4), np.array([0, 5.0, 0, 0])).endswith("for 5 N·m")
+    q, v = robot.q_reference, np.array([0.2, 0.1, 0.0, -0.1])
+    assert repr(osc.Plant(robot, q, v)).endswith("fastest joint 0.2 m/s)")
+    assert repr(osc.Plant(robot, q, -2.0 * v[::-1])).endswith("fastest joint 0.4 m/s)")
+    assert repr(osc.Plant(robot, q, np.roll(v, 1))).endswith("fastest joint 0.2 rad/s)")
     heads, rows = joints_table(check_robot(robot).joints)
     assert heads[1] == "reference [m, rad]"
     assert heads[5] == "torque [N, N·m]"
