@@ -12,6 +12,7 @@ from opspace.plots import plot_columns
 from opspace.runs.check import check_robot
 from opspace.runs.metrics import measure, units_of
 from opspace.runs.tables import joints_table, metrics_table, timeline_table
+from tests.robots.hands_and_scenes import arm_with_fingers, joint, link
 
 NAMES = ("/arm/lift", "left/turn", "Gelenk drei ä", "j 4")
 ARM = """<mujoco><worldbody><body name="a"><joint name="{}" type="slide" axis="0 0 1" range="0 .5"/>
@@ -45,6 +46,52 @@ def test_what_slides_is_recorded_in_metres_and_newtons(recording):
     rows = [recording.units[f"tasks/posture/error/{i}"] for i in range(4)]
     assert tuple(rows) == lengths == tuple(recording.header["robot"]["units"])
     assert recording.members("q") == tuple(f"q/{name}" for name in NAMES)
+
+
+def fingers(path):
+    """A finger that slides, and one that turns as the first one slides."""
+    return arm_with_fingers(path / "hand.urdf", "", '<mimic joint="f1" multiplier="20"/>')
+
+
+def lift(path):
+    """A column with wheels: what turns without end stands beside what slides."""
+    written = path / "lift.urdf"
+    links = "".join(map(link, ("base", "carriage", "arm", "wheel")))
+    up = joint("lift", "base", "carriage", kind="prismatic", axis="0 0 1")
+    wheel = joint("roll", "base", "wheel", kind="continuous")
+    shoulder = joint("shoulder", "carriage", "arm")
+    written.write_text(f'<robot name="r">{links}{up}{shoulder}{wheel}</robot>')
+    return written
+
+
+def cart(path):
+    """A base that slides twice and turns, by one body of an MJCF file."""
+    written = path / "cart.xml"
+    written.write_text(
+        '<mujoco><worldbody><body><joint name="x" type="slide" axis="1 0 0"/>'
+        '<joint name="y" type="slide" axis="0 1 0"/><joint name="yaw" axis="0 0 1"/>'
+        '<geom size=".2"/></body></worldbody></mujoco>'
+    )
+    return written
+
+
+@pytest.mark.parametrize(
+    ("write", "slides"),
+    [(fingers, {"f1"}), (lift, {"lift"}), (cart, {"x", "y"})],
+)
+def test_tasks_checks_and_recordings_measure_slides_in_metres(tmp_path, write, slides):
+    robot, task = osc.load_robot(write(tmp_path)), osc.PostureTask()
+    controller = osc.Controller(robot, osc.Stack([osc.JointLimits(), task]))
+    recorder = osc.TickRecorder(tmp_path / "run", controller, {})
+    osc.simulate(osc.Plant(robot, robot.q_reference), controller, 0.002, [recorder])
+    recorder.close()
+    units = osc.load(tmp_path / "run").units
+    of_place = ["m" if name in slides else "rad" for name in robot.joint_names]
+    assert [units[f"q/{name}"] for name in robot.joint_names] == of_place == list(task.units)
+    assert [report.unit for report in check_robot(robot).joints] == of_place
+    for name, unit in zip(robot.joint_names, of_place, strict=True):
+        assert units[f"v/{name}"] == f"{unit}/s"
+        assert units[f"tau/{name}"] == ("N" if unit == "m" else "N·m")
 
 
 def test_odd_names_reach_every_format(recording, tmp_path):
