@@ -68,7 +68,7 @@ test-lowest: $(INSTALLED)
 	printf 'cmeel-urdfdom<5\ncmeel-tinyxml2<11\n' > $(LOWEST)/built-for.txt
 	$(BIN)/uv pip compile --quiet --python $(LOWEST)/bin/python --resolution lowest-direct --only-binary :all: --constraints $(LOWEST)/built-for.txt --extra all --no-header --no-annotate --output-file $(LOWEST)/lowest.txt pyproject.toml
 	$(BIN)/uv pip install --quiet --python $(LOWEST)/bin/python --constraints $(LOWEST)/lowest.txt --editable '.[all,docs,test]'
-	NUMBA_CACHE_DIR=$(CURDIR)/$(LOWEST)/kept $(LOWEST)/bin/python -m pytest -n 2 -W default
+	NUMBA_CACHE_DIR=$(CURDIR)/$(LOWEST)/kept $(LOWEST)/bin/python -m pytest -n 2 -W default -W ignore::DeprecationWarning
 
 test-slow: $(INSTALLED)
 	$(BIN)/python -m pytest -m slow

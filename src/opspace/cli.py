@@ -170,6 +170,7 @@ def run(
     ] = None,
 ) -> None:
     """Simulate a scenario, record it and measure it."""
+    from opspace.runs.metrics import units_of
     from opspace.runs.progress import ProgressBar
     from opspace.runs.run import run_scenario
     from opspace.runs.tables import metrics_table, timeline_table
@@ -189,7 +190,7 @@ def run(
     if loaded.events:
         _print_table(*timeline_table(loaded.events, result.recording))
         print()
-    _print_table(*metrics_table({"value": result.metrics}))
+    _print_table(*metrics_table({"value": result.metrics}, units_of(result.recording)))
     if not result.outcome.completed:
         print(f"stopped at {result.outcome.t:.3f} s: {result.outcome.reason}")
     print(f"results: {out}")
@@ -689,7 +690,8 @@ def replay(
 
     found = replay(recording)
     print(f"{found.ticks} ticks; how the recorded run ended: {found.ended}")
-    print(f"largest difference of a torque: {found.gap:.3g} N·m at t = {found.gap_at:.3f} s")
+    gap = f"{found.gap:.3g} {found.unit}"
+    print(f"largest difference of a torque: {gap} at t = {found.gap_at:.3f} s")
     print(f"last tick: {found.last}{', as recorded' if found.repeated else ', NOT as recorded'}")
     if found.seconds:
         rows = [

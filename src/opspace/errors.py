@@ -5,7 +5,9 @@ from __future__ import annotations
 import difflib
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
+
+T = TypeVar("T")
 
 
 class OpspaceError(Exception):
@@ -16,8 +18,10 @@ class InputError(OpspaceError, ValueError):
     """A number, shape or value that cannot be used."""
 
 
-class UnknownNameError(OpspaceError):
+class UnknownNameError(OpspaceError, KeyError):
     """A name that does not exist; the message lists near matches and the valid choices.
+
+    A `KeyError` too, as what is asked for by name is often asked of a mapping.
 
     Attributes:
         name: The name as given.
@@ -32,6 +36,8 @@ class UnknownNameError(OpspaceError):
         self.name = name
         self.kind = kind
         self.choices = tuple(choices)
+
+    __str__ = Exception.__str__  # a KeyError would put the message into quotes
 
     def reworded(self, message: str) -> UnknownNameError:
         """Say the same in a context that the message tells."""
@@ -112,6 +118,13 @@ def unknown_name(
         kind=kind,
         choices=valid,
     )
+
+
+class ByName(dict[str, T]):
+    """What a tick tells by name; a name that is not there is refused with those that are."""
+
+    def __missing__(self, name: str) -> T:
+        raise unknown_name("name in this tick", name, self)
 
 
 def missing_extra(package: str, extra: str) -> MissingExtraError:

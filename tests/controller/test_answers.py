@@ -1,8 +1,14 @@
-"""A tick answers one number: what happened, and how many hard torques it took."""
+"""A tick answers one number: what happened, and how many hard torques it took; and more by name."""
 
+import copy
+import pickle
+
+import numpy as np
 import pytest
 
+import opspace as osc
 from opspace import Status
+from opspace.controller import ReferenceController
 from opspace.controller.controller import STATUSES
 from opspace.kernels.columns import SOLVE
 
@@ -26,3 +32,20 @@ def test_every_pair_of_flags_has_its_status():
     for a in Status:
         for b in Status:
             assert STATUSES[int(a) | int(b)] == a | b
+
+
+@pytest.mark.parametrize("kind", [osc.Controller, ReferenceController])
+@pytest.mark.parametrize("name", ["hand", "posturee", "", "elbow"])
+def test_a_name_of_which_a_tick_tells_nothing_is_refused(kind, name):
+    robot = osc.load_robot("puma560")
+    stack = osc.Stack([osc.PositionTask(), osc.PostureTask()])
+    command = kind(robot, stack).step(0.0, robot.q_reference, np.zeros(6))
+    for answer in (command, pickle.loads(pickle.dumps(command)), copy.deepcopy(command)):
+        assert name not in answer.tasks
+        assert answer.tasks.get(name) is None
+        with pytest.raises(osc.UnknownNameError, match=rf"'{name}'.*valid: position, posture") as e:
+            answer.tasks[name]
+        assert e.value.choices == ("position", "posture")
+        for told in (answer.contacts, answer.distances):
+            with pytest.raises(KeyError, match=rf"'{name}' \(valid: none\)"):
+                told[name]

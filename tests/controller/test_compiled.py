@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 import opspace as osc
@@ -30,6 +30,7 @@ from opspace.tasks import (
     Task,
     TaskTerms,
 )
+from tests.budget import examples
 from tests.stack.arm import state, tasks_for
 from tests.stack.programs import Program, programs, running_of
 
@@ -209,7 +210,7 @@ def test_many_joints_at_their_limits():
     assert max(found) >= 4
 
 
-@settings(max_examples=30)
+@examples(10)
 @given(
     steps=programs(0.002, 0.06),
     seed=st.integers(0, 2**32 - 1),
@@ -375,7 +376,7 @@ def test_a_rotation_past_half_a_turn_keeps_its_way():
 def test_no_angle_makes_a_step(robot, max_speed):
     """Two turns of the first joint away from the target: ten times finer, steps of a tenth."""
     largest = []
-    for ticks in (200, 2000):
+    for ticks in (100, 1000):
         twins = Twins(robot, lambda: [OrientationTask(kp=50.0, max_speed=max_speed)])
         q, v = twins.robot.q_reference.copy(), np.zeros(6)
         path = []

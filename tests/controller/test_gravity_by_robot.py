@@ -9,7 +9,7 @@ from opspace.errors import InputError, UnknownNameError
 from opspace.record.black_box import BlackBox
 
 FORMS = (osc.Controller, ReferenceController)
-ROBOTS = ("puma560", "panda", "ur5")
+ROBOTS = ("puma560", "panda", "ur5", "z1", "so101")
 
 
 def stack():
@@ -25,7 +25,7 @@ def test_the_tool_is_held_where_the_robot_carries_itself(name, form):
     robot.update(plant.q, plant.v)
     tool = robot.frame_id(robot.tool)
     before = robot.position(tool).copy()
-    assert osc.simulate(plant, controller, 0.3).completed
+    assert osc.simulate(plant, controller, 0.05).completed
     robot.update(plant.q, plant.v)
     assert np.linalg.norm(robot.position(tool) - before) < 1e-6
 
@@ -65,13 +65,13 @@ def test_a_handover_begins_and_ends_without_gravity(form):
     robot = osc.load_robot("panda")
     plant = osc.Plant(robot, robot.q_reference, adds_gravity=True)
     controller = form(robot, stack(), gravity="robot")
-    controller.take_over(np.zeros(7), duration=0.05)
+    controller.take_over(np.zeros(7), duration=0.02)
     first = controller.step(0.0, plant.q, plant.v)
     np.testing.assert_allclose(first.tau, 0.0, atol=1e-12)
     assert osc.Status.HANDOVER in first.status
-    osc.simulate(plant, controller, 0.1)
-    controller.hand_back(np.zeros(7), duration=0.05)
-    osc.simulate(plant, controller, 0.2)
+    osc.simulate(plant, controller, 0.04)
+    controller.hand_back(np.zeros(7), duration=0.02)
+    osc.simulate(plant, controller, 0.04)
     last = controller.step(plant.t, plant.q, plant.v)
     np.testing.assert_allclose(last.tau, 0.0, atol=1e-12)
     assert np.abs(plant.q - robot.q_reference).max() < 1e-5

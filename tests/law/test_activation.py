@@ -4,13 +4,14 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from opspace.errors import InputError, UnknownNameError
 from opspace.law import PROFILES, Buffer, Profile, Ramp
+from tests.budget import examples
 
-MANY = settings(max_examples=300)
+MANY = examples(60)
 UNIT = st.floats(0.005, 0.995)
 SMOOTH = [name for name in PROFILES if name != "step"]
 

@@ -71,7 +71,7 @@ def compiled_torque(L, tasks, blend, buffer):
     return L @ u
 
 
-@examples(150)
+@examples(50)
 @given(
     seed=st.integers(0, 2**32 - 1),
     smooth=st.booleans(),

@@ -3,13 +3,14 @@
 import itertools
 
 import numpy as np
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from opspace.law import TaskSet, task_torque
+from tests.budget import examples
 from tests.law.stacks import inertia
 
-MANY = settings(max_examples=300)
+MANY = examples(60)
 SEEDS = st.integers(0, 2**32 - 1)
 H = st.floats(0.0, 1.0)
 RTOL = 1e-8

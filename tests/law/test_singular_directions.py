@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from opspace.errors import InputError
@@ -12,7 +12,7 @@ from opspace.law.singular_directions import solve_level_smoothly
 from tests.budget import examples
 from tests.law.stacks import inertia, stacks
 
-MANY = settings(max_examples=300)
+MANY = examples(60)
 SEEDS = st.integers(0, 2**32 - 1)
 BUFFER = SigmaBuffer(0.01, 0.02)
 
@@ -60,7 +60,7 @@ def largest_steps(torque, start, end):
     return coarse[worst], np.max(fine)
 
 
-@examples(80)
+@examples(30)
 @given(SEEDS, st.sampled_from([0.01, 0.02]))
 def test_torque_is_continuous_where_sigma_crosses_an_edge(seed, edge):
     sweep = Sweep(seed)
@@ -70,7 +70,7 @@ def test_torque_is_continuous_where_sigma_crosses_an_edge(seed, edge):
     assert fine <= 0.4 * coarse + 1e-10
 
 
-@examples(80)
+@examples(30)
 @given(SEEDS, st.floats(0.012, 0.018))
 def test_torque_is_continuous_where_two_sigmas_cross_in_the_buffer(seed, at):
     """The level below uses two of seven joints' motions, so giving back the wrong one would show."""

@@ -4,7 +4,7 @@ from itertools import combinations
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from opspace.law import TaskSet, intermediate_values, task_torque
@@ -13,7 +13,7 @@ from opspace.law.recursion import law_recursion
 from tests.budget import examples
 from tests.law.stacks import inertia, scale_of, stacks
 
-MANY = settings(max_examples=300)
+MANY = examples(60)
 
 
 def hard_torques(M, tasks):
@@ -111,7 +111,7 @@ def test_the_adapter_around_the_law_gives_the_laws_own_values(stack, blending):
         np.testing.assert_allclose(a, b, rtol=0, atol=1e-8 * scale)
 
 
-@examples(100)
+@examples(30)
 @given(stacks(), st.sampled_from(["idv", "chain"]), st.data())
 def test_torque_is_continuous_along_paths_of_all_activations(stack, blending, data):
     """No step is larger than the activations' own steps times the widest gap of hard torques.

@@ -71,3 +71,37 @@ def test_a_robot_without_a_file_cannot_be_shown():
     robot.source = None
     with pytest.raises(ModelError, match="puma560"):
         visuals_of(robot)
+
+
+LINKS = """<mujoco><asset><mesh name="hull" file="gone.stl"/>
+<material name="glass" rgba="1 1 1 {clear}"/>
+</asset><worldbody><geom type="plane" size="1 1 1"/><body pos="0 0 .3">
+<inertial pos="0 0 0" mass="1" diaginertia=".1 .1 .1"/><joint name="a" axis="0 1 0"/>{one}
+<body pos="0 0 .4"><inertial pos="0 0 0" mass="1" diaginertia=".1 .1 .1"/><joint name="b" axis="0 1 0"/>
+{other}</body></body></worldbody></mujoco>"""
+
+
+@pytest.mark.filterwarnings("ignore::opspace.ModelWarning")
+@pytest.mark.parametrize(
+    ("one", "other", "clear", "shown"),
+    [
+        ('<geom type="mesh" mesh="hull" contype="0" conaffinity="0"/>', "", 1, 3),
+        ('<geom size=".1" group="3"/>', '<geom type="capsule" size=".1 .1" group="4"/>', 1, 3),
+        ("", "", 1, 3),
+        ('<geom size=".1" material="glass"/>', '<geom size=".1" rgba="1 0 0 0"/>', 0, 3),
+        ('<geom size=".1" material="glass"/>', '<geom size=".1" group="3"/>', 1, 1),
+        ('<geom size=".1"/>', '<geom type="mesh" mesh="hull"/>', 1, 1),
+    ],
+)
+def test_an_mjcf_file_of_which_nothing_is_seen_is_shown_as_capsules(
+    tmp_path, one, other, clear, shown
+):
+    """A ball at each joint and a capsule between them; what the file shows is shown alone."""
+    path = tmp_path / "bare.xml"
+    path.write_text(LINKS.format(one=one, other=other, clear=clear))
+    visuals = visuals_of(load_robot(path))
+    assert len(visuals.shapes) == shown
+    positions, _ = visuals.poses(np.zeros(2))
+    assert {round(float(z), 9) for z in positions[:, 2]} == (
+        {0.3, 0.5, 0.7} if shown > 1 else {0.3}
+    )

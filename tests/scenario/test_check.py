@@ -9,7 +9,7 @@ from opspace.controller import Controller
 from opspace.plan.scales import Singularity
 from opspace.robots import load_robot
 from opspace.robots.sampled_postures import sample_postures
-from opspace.runs.check import check_robot, to_plain
+from opspace.runs.check import check_robot, rounded, to_plain
 from opspace.stack import Stack
 from opspace.tasks import PositionTask
 from tests.robots.serial_arms import serial_arm
@@ -55,6 +55,17 @@ def test_what_is_not_known_is_said(tmp_path):
     known = report(tmp_path, 'actuatorfrcrange="-80 80"')
     assert known.joints[0].max_torque == 80
     assert warned(known, "no torque limit is known for bend;")
+
+
+@pytest.mark.parametrize(
+    ("number", "text"),
+    [
+        (2000.0, "2000"), (999.6, "1000"), (-4321.4, "-4321"), (1.2e7, "1.2e+07"), (999.4, "999"),
+        (0.0123456, "0.0123"), (-1e-14, "0"), (87.0, "87"), (np.inf, "inf"),
+    ],
+)  # fmt: skip
+def test_numbers_are_written_for_people(number, text):
+    assert rounded(number) == text
 
 
 @pytest.mark.parametrize(("q", "near"), [("1.5 1", True), ("1.4 1", False)])

@@ -6,13 +6,14 @@ import random
 import numpy as np
 import pytest
 import yaml
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 import opspace as osc
 from opspace.errors import OpspaceError
 from opspace.scenario.build import build
 from opspace.scenario.load import load_scenario, scenario_from, shipped_scenarios, to_dict
+from tests.budget import examples
 
 SEEDS = st.integers(0, 2**32 - 1)
 TEXT = {
@@ -115,7 +116,7 @@ def damaged(text, rng):
 
 
 @given(SEEDS)
-@settings(max_examples=150)
+@examples(50)
 def test_a_scenario_with_odd_values_is_one_or_is_refused(seed):
     rng = random.Random(seed)
     data = mutated(yaml.safe_load(rng.choice(list(TEXT.values()))), rng)
@@ -136,7 +137,7 @@ def test_a_scenario_with_odd_values_is_one_or_is_refused(seed):
 
 
 @given(SEEDS)
-@settings(max_examples=150)
+@examples(50)
 def test_a_damaged_scenario_file_is_one_or_is_refused(tmp_path_factory, seed):
     rng = random.Random(seed)
     path = tmp_path_factory.mktemp("fuzz") / "scenario.yaml"
@@ -150,7 +151,7 @@ def test_a_damaged_scenario_file_is_one_or_is_refused(tmp_path_factory, seed):
 
 @pytest.mark.parametrize(("suffix", "source"), [(".urdf", URDF), (".xml", MJCF)])
 @given(SEEDS)
-@settings(max_examples=120)
+@examples(40)
 def test_a_damaged_robot_file_is_a_robot_or_is_refused(tmp_path_factory, suffix, source, seed):
     path = tmp_path_factory.mktemp("fuzz") / f"arm{suffix}"
     path.write_text(damaged(source, random.Random(seed)), encoding="utf-8")

@@ -6,7 +6,7 @@ import shutil
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 import opspace as osc
@@ -56,7 +56,7 @@ def finite(command):
 
 
 @given(SEEDS)
-@settings(max_examples=120)
+@examples(40)
 def test_odd_states_and_times_get_an_answer_or_are_refused(seed):
     rng = random.Random(seed)
     state = [rng.choice([0.0, 1, "1", None, np.float32(2), *NUMBERS, object()]), odd(rng), odd(rng)]
@@ -73,7 +73,7 @@ def test_odd_states_and_times_get_an_answer_or_are_refused(seed):
 
 
 @given(SEEDS)
-@settings(max_examples=120)
+@examples(40)
 def test_odd_torques_to_take_over_or_hand_back_are_taken_or_refused(seed):
     rng = random.Random(seed)
     controller = CONTROLLER
@@ -101,7 +101,7 @@ def make_good():
 
 
 @given(SEEDS)
-@settings(max_examples=120)
+@examples(40)
 def test_odd_targets_and_gains_are_taken_or_refused(seed):
     """At their assignment or at the next tick, and good ones make everything good again."""
     rng = random.Random(seed)

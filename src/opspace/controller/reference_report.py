@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from opspace.command import LevelStatus, TaskStatus
+from opspace.errors import ByName
 from opspace.law import LawInfo
 from opspace.stack import Member, Mixture
 from opspace.tasks import TaskTerms
@@ -20,12 +21,13 @@ def task_status(
     mixed: Mixture,
 ) -> dict[str, TaskStatus]:
     """Tell about every task: how much of it there is, at which levels, and its error."""
-    return {
-        member.task.name: TaskStatus(
-            h, levels, term.error, math.sqrt(float(term.error @ term.error))
+    return ByName(
+        (
+            member.task.name,
+            TaskStatus(h, levels, term.error, math.sqrt(float(term.error @ term.error))),
         )
         for member, h, term, levels in zip(members, activations, terms, mixed.shares, strict=True)
-    }
+    )
 
 
 def level_status(

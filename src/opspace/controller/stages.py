@@ -26,7 +26,7 @@ from opspace.controller.limit_task_sets import (
     limit_terms,
 )
 from opspace.controller.reference_report import level_status, task_status
-from opspace.errors import InputError
+from opspace.errors import ByName, InputError
 from opspace.law import (
     LawInfo,
     Motors,
@@ -210,8 +210,11 @@ def tick(k: Given) -> Answer | None:
         return None
     active = {limits[i].side.name: limit for i, limit in inserted.items()} | dict(kept.limits)
     levels = level_status(k.members, mixed, info, len(above.task_sets))
-    apart = {} if distances is None else distances.layout.status(distances.distance, kept.taken)
-    found = Found(task_status(k.members, h, terms, mixed), levels, active, apart, kept.contacts)
+    apart = (
+        ByName() if distances is None else distances.layout.status(distances.distance, kept.taken)
+    )
+    told = task_status(k.members, h, terms, mixed)
+    found = Found(told, levels, active, apart, ByName(kept.contacts))
     happened = status(k, kept.tau, info, found) | kept.status
     placings = NO_PLACINGS if distances is None else distances.by_name
     return Answer(

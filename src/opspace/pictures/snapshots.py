@@ -36,6 +36,7 @@ except ImportError as error:
 
 from opspace.robots.mujoco_model import model_of
 from opspace.robots.mujoco_names import joint_names
+from opspace.robots.mujoco_scene import draw_what_is_unseen
 
 __all__ = ["SnapshotUnavailableError", "render", "snapshot_strip", "snapshots"]
 
@@ -132,7 +133,7 @@ def render(
         raise ModelError(f"robot {robot.name!r} was not read from a file that MuJoCo could render")
     if not times or not len(recording):
         raise InputError("a snapshot needs a time and a recording with a tick")
-    model = model_of(robot)
+    model = model_of(robot, draw_what_is_unseen)
     # The shadow map must reach beyond what is in view, or its edge speckles the floor.
     model.vis.map.shadowclip, model.vis.quality.shadowsize = 4.0, shadow_map
     data = mujoco.MjData(model)

@@ -8,14 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from opspace.command import (
-    NO_CONTACTS,
-    ContactStatus,
-    Distance,
-    Found,
-    LevelStatus,
-    TaskStatus,
-)
+from opspace.command import ContactStatus, Distance, Found, LevelStatus, TaskStatus
+from opspace.errors import ByName
 from opspace.kernels.columns import slot_bit
 from opspace.plan.memory import Reported
 from opspace.plan.pack_contacts import ContactTick
@@ -46,11 +40,11 @@ class CompiledReport:
     def __reduce__(self) -> tuple[Any, ...]:
         """Be copied as what is told: the plan is of this controller, and its memory of this process."""
         return Found, (
-            dict(self.tasks),
+            ByName(self.tasks),
             self.levels,
             dict(self.limits),
-            dict(self.distances),
-            dict(self.contacts),
+            ByName(self.distances),
+            ByName(self.contacts),
         )
 
     @property
@@ -80,20 +74,20 @@ class CompiledReport:
     def contacts(self) -> Mapping[str, ContactStatus]:
         """Status of each contact by name."""
         if not self._footing:
-            return NO_CONTACTS
+            return ByName()
         found = self._found()
         told = found["contact_force"], found["contact_axes"], found.numbers("contact_use")
-        return {
-            footing.contact.name: footing.status(force, axes, use)
+        return ByName(
+            (footing.contact.name, footing.status(force, axes, use))
             for footing, force, axes, use in zip(self._footing, *told, strict=False)
-        }
+        )
 
     @property
     def distances(self) -> Mapping[str, Distance]:
         """Pairs of bodies that are kept apart, by name, the nearest first."""
         distances = self._plan.distances
         if distances is None:
-            return {}
+            return ByName()
         found = self._found()
         return distances.layout.status(found["distance"], found["distance_taken"])
 
@@ -103,7 +97,7 @@ class CompiledReport:
         for (level, i, _), share in zip(plan.places, found.numbers("share"), strict=True):
             if share > 0.0:
                 shares[i][level] = shares[i].get(level, 0.0) + share
-        status: dict[str, TaskStatus] = {}
+        status: ByName[TaskStatus] = ByName()
         errors = found["error"]
         for packed, levels, h in zip(plan.packed, shares, found.numbers("h"), strict=True):
             error = errors[packed.rows].copy()

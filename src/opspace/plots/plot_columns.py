@@ -44,6 +44,8 @@ class Row(NamedTuple):
     @property
     def label(self) -> str:
         """What the vertical axis says."""
+        if (self.name, self.unit) == ("tau", "N"):
+            return "joint force [N]"
         return f"{QUANTITIES.get(self.name, self.name)} [{self.unit}]"
 
     def lines(self, recording: Recording) -> list[Line]:

@@ -72,6 +72,15 @@ class Recording:
         """The unit of each column."""
         return {column.name: column.unit for column in self.columns}
 
+    def unit_of(self, group: str) -> str:
+        """Return the unit of a group; where its columns have several, all of them in their order.
+
+        Raises:
+            UnknownNameError: There is no such group.
+        """
+        units = self.units
+        return ", ".join(dict.fromkeys(units[name] for name in self.members(group)))
+
     @property
     def t(self) -> np.ndarray:
         """(T,) time [s]: the column ``t``."""

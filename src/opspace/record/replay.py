@@ -25,9 +25,10 @@ class Replay:
 
     Attributes:
         ticks: How many ticks were replayed.
-        gap: Largest difference between a recorded torque and the one that came out, N·m.
+        unit: Of torques; N·m and N where some joints turn and some slide.
+        gap: Largest difference between a recorded torque and the one that came out, N·m or N.
         gap_at: Time of that tick, s.
-        last_gap: The difference in the last tick, N·m; NaN where there was no torque.
+        last_gap: The difference in the last tick, N·m or N; NaN where there was no torque.
         seconds: By name of a status how long it held, s.
         first: By name of a status when it held first, s.
         last: What the last tick answered: the names of its statuses, or its error.
@@ -37,6 +38,7 @@ class Replay:
 
     ticks: int
     ended: str
+    unit: str
     gap: float = 0.0
     gap_at: float = 0.0
     last_gap: float = np.nan
@@ -73,7 +75,8 @@ def replay(
     if not isinstance(recording, Recording):
         recording = load(recording)
     rows = _rows(recording, controller)
-    found = Replay(len(recording), f"{recording.ended.how} {recording.ended.reason}".strip())
+    ended = f"{recording.ended.how} {recording.ended.reason}".strip()
+    found = Replay(len(recording), ended, recording.unit_of("tau"))
     _begin(recording, controller)
     obstacles = ObstaclePlayer(recording, controller)
     for i, (t, q, v, tau, _, wrenches) in enumerate(rows[:-1]):

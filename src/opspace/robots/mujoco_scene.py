@@ -13,6 +13,9 @@ JOINT_RGBA = (0.20, 0.36, 0.58, 1.0)
 RADIUS = 0.045
 """Of the largest ball that stands for a joint, m."""
 
+COLLISION_GROUP = 3
+"""MuJoCo's convention: shapes of this group and above are for contacts only."""
+
 
 def add_skeleton(spec: mujoco.MjSpec) -> None:
     """Draw a capsule from each joint to the next and a ball at each joint.
@@ -42,6 +45,21 @@ def add_skeleton(spec: mujoco.MjSpec) -> None:
             )
     for body in moving:
         _draw(body, mujoco.mjtGeom.mjGEOM_SPHERE, size=[radius, 0.0, 0.0], rgba=JOINT_RGBA)
+
+
+def draw_what_is_unseen(spec: mujoco.MjSpec) -> None:
+    """Draw the skeleton of a robot that nothing shows: without meshes, or with shapes for contact only.
+
+    Args:
+        spec: Specification to draw in.
+    """
+    clear = {material.name for material in spec.materials if material.rgba[3] == 0.0}
+    for body in spec.bodies[1:]:
+        for geom in body.geoms:
+            unseen = geom.material in clear if geom.material else geom.rgba[3] == 0.0
+            if geom.group < COLLISION_GROUP and not unseen:
+                return
+    add_skeleton(spec)
 
 
 def add_scenery(spec: mujoco.MjSpec) -> None:

@@ -26,6 +26,7 @@ except ImportError as error:
     raise missing_extra(error.name or "trimesh", "view") from None
 
 from opspace.robots.mujoco_model import model_of
+from opspace.robots.mujoco_scene import COLLISION_GROUP, draw_what_is_unseen
 
 PACKAGE_DEPTH = 8
 """Directories above a URDF file in which its packages are looked for."""
@@ -35,9 +36,6 @@ PLAIN = (196, 201, 208)
 
 _UNTOLD = 0.9
 """What Pinocchio says of such a mesh, in all three channels."""
-
-_COLLISION_GROUP = 3
-"""MuJoCo's convention: shapes of this group and above are for contacts only."""
 
 
 @dataclass(frozen=True)
@@ -81,8 +79,8 @@ class Visuals(Protocol):
 def visuals_of(robot: Robot) -> Visuals:
     """Collect the shapes of a robot.
 
-    A URDF is shown with its meshes; where they cannot be read, and where it has none, it is shown
-    as capsules between its joints.
+    A robot is shown with its meshes and simple shapes; where they cannot be read, and where it has
+    none but for contacts, it is shown as capsules between its joints.
 
     Args:
         robot: The robot.
@@ -99,7 +97,7 @@ def visuals_of(robot: Robot) -> Visuals:
         found = _UrdfVisuals(robot.source, robot)
         if found.shapes:
             return found
-    return _MujocoVisuals(model_of(robot), spread_of(robot))
+    return _MujocoVisuals(model_of(robot, draw_what_is_unseen), spread_of(robot))
 
 
 QUATERNION = 4
@@ -140,17 +138,18 @@ class _UrdfVisuals:
 
 
 class _MujocoVisuals:
-    """Shapes of an MJCF file, or the capsules that stand for a URDF without meshes."""
+    """Shapes of an MJCF file, or the capsules that stand for a robot without any."""
 
     def __init__(self, model: mujoco.MjModel, spread: Spread | None) -> None:
         self._model, self._data = model, mujoco.MjData(model)
         self._spread = spread
-        planes = (mujoco.mjtGeom.mjGEOM_PLANE, mujoco.mjtGeom.mjGEOM_HFIELD)
+        # Numbers of a model equal MuJoCo's names from one side only, which `in` does not ask.
+        ground = {int(mujoco.mjtGeom.mjGEOM_PLANE), int(mujoco.mjtGeom.mjGEOM_HFIELD)}
         self._shown = [
             g
             for g in range(model.ngeom)
-            if model.geom_type[g] not in planes
-            and model.geom_group[g] < _COLLISION_GROUP
+            if int(model.geom_type[g]) not in ground
+            and model.geom_group[g] < COLLISION_GROUP
             and _rgba(model, g)[3] > 0.0
         ]
         self.shapes = tuple(_mujoco_shape(model, g) for g in self._shown)

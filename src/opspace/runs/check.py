@@ -155,8 +155,9 @@ def to_plain(report: RobotCheck) -> dict[str, Any]:
 
 
 def rounded(value: float) -> str:
-    """Write a number for people, what is rounding only as zero."""
-    return f"{value if abs(value) > ROUNDING else 0.0:.3g}"
+    """Write a number for people: three digits, thousands in full, what is rounding only as zero."""
+    size = abs(value)
+    return f"{value:.0f}" if 999.5 <= size < 1e6 else f"{value if size > ROUNDING else 0.0:.3g}"
 
 
 def _sigma(controller: Controller) -> tuple[float, ...]:

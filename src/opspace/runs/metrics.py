@@ -28,7 +28,10 @@ UNITS: Mapping[str, str] = MappingProxyType(
         "min_joint_position": "rad",
     }
 )
-"""The unit of each of the metrics; for prismatic joints read N, m/s and m."""
+"""The unit of each of the metrics where every joint turns, see `units_of`."""
+
+_JOINT_METRICS = {"max_torque_step": "tau", "max_joint_speed": "v", "rest_speed": "v"}
+"""Those that are the largest of any joint, and the columns that they are taken from."""
 
 _ANGULAR = "rad"
 _TASKS = {"m": "position", _ANGULAR: "orientation"}
@@ -65,6 +68,15 @@ class Metrics:
     def to_json(self) -> dict[str, bool | float | None]:
         """Return the numbers by name, all finite, None where there is none."""
         return asdict(self)
+
+
+def units_of(recording: Recording) -> dict[str, str]:
+    """Return the unit of each of the metrics of a run: joints that slide are in N and m/s.
+
+    A number that may come from joints of both kinds has both units, those of the first joint first.
+    """
+    of_joints = {name: recording.unit_of(group) for name, group in _JOINT_METRICS.items()}
+    return {**UNITS, **of_joints}
 
 
 def measure(

@@ -8,22 +8,25 @@ from opspace.record import Recording
 from opspace.robots.joint_units import effort_unit
 from opspace.runs.check import JointReport, rounded
 from opspace.runs.event_times import began
-from opspace.runs.metrics import UNITS, Metrics, largest_torque_step
+from opspace.runs.metrics import UNITS, Metrics, largest_torque_step, units_of
 from opspace.scenario.events import Event, in_order
 
 
-def metrics_table(runs: Mapping[str, Metrics]) -> tuple[list[str], list[list[str]]]:
+def metrics_table(
+    runs: Mapping[str, Metrics], units: Mapping[str, str] = UNITS
+) -> tuple[list[str], list[list[str]]]:
     """Write metrics, one column per run.
 
     Args:
         runs: Metrics by name of the run.
+        units: Their units, see `units_of`.
 
     Returns:
         Heads and rows; numbers that no run has are left out.
     """
     numbers = {name: metrics.to_json() for name, metrics in runs.items()}
     rows = []
-    for key, unit in UNITS.items():
+    for key, unit in units.items():
         values = [found[key] for found in numbers.values()]
         if any(value is not None for value in values):
             rows.append(
@@ -46,7 +49,8 @@ def timeline_table(
         from the beginning of the event to its end. An event that waited for what did not happen has
         no times.
     """
-    heads = ["from [s]", "to [s]", "event", "level", "largest torque step [N·m]"]
+    unit = units_of(recording)["max_torque_step"]
+    heads = ["from [s]", "to [s]", "event", "level", f"largest torque step [{unit}]"]
     rows = []
     for _, event in in_order(events):
         what = f"{event.kind} {', '.join(event.tasks)}"

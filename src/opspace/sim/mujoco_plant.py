@@ -11,6 +11,7 @@ import numpy as np
 
 from opspace.errors import InputError, ModelError, missing_extra
 from opspace.robots.adapter import spread_of
+from opspace.robots.joint_units import joint_units
 from opspace.robots.motor_range import motor_range
 from opspace.sim.disturbances import NO_DISTURBANCES, Disturbances, Hand, Wire
 from opspace.sim.ground import Ground
@@ -140,10 +141,11 @@ class Plant:
         self.dt = dt
 
     def __repr__(self) -> str:
-        fastest = float(np.max(np.abs(self.v), initial=0.0))
+        speeds = np.abs(self.v)
+        fastest = int(np.argmax(speeds))
         return (
             f"Plant({self._robot.name!r}, t={self.t:g} s, dt={self.dt:g} s, "
-            f"fastest joint {fastest:.3g} rad/s)"
+            f"fastest joint {speeds[fastest]:.3g} {joint_units(self._robot)[fastest]}/s)"
         )
 
     def __getstate__(self) -> dict[str, Any]:

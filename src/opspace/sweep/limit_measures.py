@@ -20,7 +20,7 @@ UNITS = {
     "above_torque_limit": "ticks",
     "max_hard_solves": "1",
 }
-"""The unit of each number of a row."""
+"""The unit of each number of a row; for joints that slide read N, m/s and m."""
 
 _ROUNDING = 1e-9
 

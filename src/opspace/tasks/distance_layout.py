@@ -11,6 +11,7 @@ from types import MappingProxyType
 import numpy as np
 
 from opspace.command import Distance
+from opspace.errors import ByName
 from opspace.law.polyhedra import FACE_ROWS, Meshes
 from opspace.robots.protocol import Robot
 from opspace.robots.shapes import LinkCapsule
@@ -82,7 +83,7 @@ class DistanceLayout:
         np.minimum.at(near, self.pair, distance)
         np.maximum.at(most, self.pair, taken)
         order = np.argsort(near, kind="stable")
-        return {self.pairs[k]: Distance(float(near[k]), float(most[k])) for k in order}
+        return ByName((self.pairs[k], Distance(float(near[k]), float(most[k]))) for k in order)
 
 
 def lay_out(
