@@ -247,7 +247,7 @@ class _Function(ast.NodeVisitor):
     def _say_Attribute(self, node: ast.Attribute) -> str:
         if isinstance(node.value, ast.Name) and self._globals.get(node.value.id) is math:
             return _number(getattr(math, node.attr))
-        return f"{self._say(node.value)}.{node.attr}_"
+        return f"{self._say(node.value)}.{node.attr}_()"
 
     def _say_Subscript(self, node: ast.Subscript) -> str:
         if isinstance(node.value, ast.Attribute) and node.value.attr == "shape":

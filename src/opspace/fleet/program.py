@@ -93,25 +93,25 @@ def _lines(plan: Plan, arrays: list[TaskArrays], address: Any) -> tuple[list[str
     """Write what a robot reads before its tick and what it tells after it."""
     nq, n = plan.axes.q.size, plan.n
     before = [
-        f"{{ const real* from = {_row('q')}; for (int k = 0; k < {nq}; ++k) work.q_(k) = from[k]; }}",
-        f"{{ const real* from = {_row('v')}; for (int k = 0; k < {n}; ++k) work.v_(k) = from[k]; }}",
+        f"{{ const real* from = {_row('q')}; for (int k = 0; k < {nq}; ++k) work.q_()(k) = from[k]; }}",
+        f"{{ const real* from = {_row('v')}; for (int k = 0; k < {n}; ++k) work.v_()(k) = from[k]; }}",
     ]
-    after = [f"{{ real* to = {_row('tau')}; for (int k = 0; k < {n}; ++k) to[k] = work.tau_(k); }}"]
+    after = [f"{{ real* to = {_row('tau')}; for (int k = 0; k < {n}; ++k) to[k] = work.tau_()(k); }}"]
     variables, limits = plan.size.variables, plan.size.limits
     start = f"ramps.data + (long long)i * {variables * VARIABLE_SIZE}"
     before.append(
         f"{{ const double now = times.shape[0] > 1 ? times.data[i] : times.data[0]; "
         f"const double* from = {start}; "
-        f"for (int k = 0; k < {variables * VARIABLE_SIZE}; ++k) work.variable_.p[k] = "
+        f"for (int k = 0; k < {variables * VARIABLE_SIZE}; ++k) work.variable_().p[k] = "
         f"real(k % {VARIABLE_SIZE} == {START} ? from[k] - now : from[k]); }}"
     )
     groups = f"groups.data + (long long)i * {variables}"
-    before.append(f"for (int k = 0; k < {variables}; ++k) work.group_.p[k] = ({groups})[k];")
-    after.append(f"for (int k = 0; k < {variables}; ++k) ({groups})[k] = work.group_.p[k];")
-    after.append("status.data[i] = robot.status_(0); solves.data[i] = robot.solves_(0);")
+    before.append(f"for (int k = 0; k < {variables}; ++k) work.group_().p[k] = ({groups})[k];")
+    after.append(f"for (int k = 0; k < {variables}; ++k) ({groups})[k] = work.group_().p[k];")
+    after.append("status.data[i] = robot.status_()(0); solves.data[i] = robot.solves_()(0);")
     after.append(
         f"for (int k = 0; k < {limits}; ++k) limits.data[(long long)i * {limits} + k] = "
-        "work.limit_h_.p[k];"
+        "work.limit_h_().p[k];"
     )
     for i, (task, packed) in enumerate(zip(arrays, plan.packed, strict=True)):
         for way, array, inside in task.places(i, packed.rows):
@@ -121,7 +121,7 @@ def _lines(plan: Plan, arrays: list[TaskArrays], address: Any) -> tuple[list[str
             if "in" in way:
                 before.append(f"for (int k = 0; k < {size}; ++k) {inside}[k] = {at}[k];")
             if "out" in way:
-                guard = f"if (robot.found_({i})) " if way == "in, out where found" else ""
+                guard = f"if (robot.found_()({i})) " if way == "in, out where found" else ""
                 after.append(f"{guard}for (int k = 0; k < {size}; ++k) {at}[k] = {inside}[k];")
     return before, after
 

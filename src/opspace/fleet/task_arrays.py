@@ -155,25 +155,25 @@ class TaskArrays:
         for name in ("target", "velocity", "acceleration"):
             width = 7 if name == "target" else 6
             start = self._start if name == "target" else 0
-            place = f"robot.{name}_.p + {i * width + start}"
+            place = f"robot.{name}_().p + {i * width + start}"
             if self._joints:
-                place = f"robot.joint_{name}_.p + {first}"
+                place = f"robot.joint_{name}_().p + {first}"
             way = "in, out where found" if name == "target" else "in"
             yield way, getattr(self, name), f"({place})"
-        yield "in", self.kp, f"(work.kp_.p + {first})"
-        yield "in", self.kv, f"(work.kv_.p + {first})"
-        yield "in", self.activation, f"(work.own_.p + {i})"
-        yield "out", self.presence, f"(work.h_.p + {i})"
-        yield "out", self.error, f"(work.error_.p + {first})"
-        yield "in", self._epoch, f"(robot.epoch_.p + {i})"
-        yield "in", self._holds, f"(robot.holds_.p + {i})"
-        yield "in, out", self._seen, f"(robot.seen_.p + {i})"
-        yield "in, out", self._remembers, f"(robot.remembers_.p + {i})"
-        yield "in, out", self._turn, f"(robot.turn_.p + {4 * i})"
+        yield "in", self.kp, f"(work.kp_().p + {first})"
+        yield "in", self.kv, f"(work.kv_().p + {first})"
+        yield "in", self.activation, f"(work.own_().p + {i})"
+        yield "out", self.presence, f"(work.h_().p + {i})"
+        yield "out", self.error, f"(work.error_().p + {first})"
+        yield "in", self._epoch, f"(robot.epoch_().p + {i})"
+        yield "in", self._holds, f"(robot.holds_().p + {i})"
+        yield "in, out", self._seen, f"(robot.seen_().p + {i})"
+        yield "in, out", self._remembers, f"(robot.remembers_().p + {i})"
+        yield "in, out", self._turn, f"(robot.turn_().p + {4 * i})"
         if self._joints:
-            yield "in, out", self._joint_before, f"(robot.joint_before_.p + {first})"
+            yield "in, out", self._joint_before, f"(robot.joint_before_().p + {first})"
         else:
-            yield "in, out", self._before, f"(robot.before_.p + {4 * i})"
+            yield "in, out", self._before, f"(robot.before_().p + {4 * i})"
 
     def _filled(self, row: ArrayLike) -> Any:
         """Make an array with the same row for every robot."""
