@@ -32,9 +32,9 @@ FUNCTIONS = {
 """What `math` and powers are there."""
 
 PRELUDE = """\
-auto value = [](auto x) { return x; };
-auto smaller = [](auto a, auto b) { return b < a ? b : a; };
-auto larger = [](auto a, auto b) { return b > a ? b : a; };
+static constexpr auto value = [](auto x) { return x; };
+static constexpr auto smaller = [](auto a, auto b) { return b < a ? b : a; };
+static constexpr auto larger = [](auto a, auto b) { return b > a ? b : a; };
 """
 """Smaller and larger answer as Python's do where a number is none."""
 
@@ -101,7 +101,7 @@ class _Function(ast.NodeVisitor):
         """Return the lambda."""
         given = ", ".join(f"auto {name}_" for name in self._parameters)
         self._block(self._tree.body)
-        return "\n".join([f"auto {self._name} = [&]({given}) {{", *self._lines, "};"])
+        return "\n".join([f"static constexpr auto {self._name} = []({given}) {{", *self._lines, "};"])
 
     # --- Statements ------------------------------------------------------------------------------
 

@@ -23,7 +23,7 @@ START = 2
 """Column of an activation in time that holds when it starts."""
 
 LOOP = re.compile(r"^( *)(for \(I )", re.M)
-LAMBDA = re.compile(r"^(auto \w+ = \[&\]\([^)]*\)) \{$", re.M)
+LAMBDA = re.compile(r"^(static constexpr auto \w+ = \[\]\([^)]*\)) \{$", re.M)
 ROLLED = {"cpu": '_Pragma("clang loop unroll(disable)")', "cuda": '_Pragma("unroll 1")'}
 """Loops stay loops: rolled out they take a compiler many times as long."""
 
