@@ -323,6 +323,17 @@ class Fleet:
 
     # --- Layout ----------------------------------------------------------------------------------
 
+    def program_for(self, kind: str) -> FleetProgram:
+        """Make the program of the tasks and levels of the last step for another kind of device.
+
+        Args:
+            kind: ``"cpu"`` or ``"cuda"``.
+        """
+        assert self._plan is not None
+        return FleetProgram(
+            self._plan, list(self._arrays.values()), self.dtype, self.device, kind=kind
+        )
+
     def _lay_out(self) -> None:
         """Make the plan, the kernel and the arrays for the tasks and levels that there are."""
         roster, before = self._roster, self._plan

@@ -101,7 +101,9 @@ class _Function(ast.NodeVisitor):
         """Return the lambda."""
         given = ", ".join(f"auto {name}_" for name in self._parameters)
         self._block(self._tree.body)
-        return "\n".join([f"static constexpr auto {self._name} = []({given}) {{", *self._lines, "};"])
+        return "\n".join(
+            [f"static constexpr auto {self._name} = []({given}) {{", *self._lines, "};"]
+        )
 
     # --- Statements ------------------------------------------------------------------------------
 

@@ -69,7 +69,12 @@ class RobotLayout:
         """Return the types of all arrays and records."""
         return "\n".join([*_array_types(self._kinds, self._frozen()), *self._structs])
 
-    def memory(self) -> str:
+    def memory_of(self, number: int) -> int:
+        """Return how many bytes a robot has for itself if a number has so many."""
+        numbers, integers = self._blocks
+        return numbers.size * number + integers.size * 8
+
+    def definitions(self) -> str:
         """Return the definitions of all records, for one robot."""
         numbers, integers = self._blocks
         lines = [*numbers.begin("real", "numbers", "fixed", self._poison)]
@@ -125,7 +130,7 @@ class _Blocks:
         own = [(f, a) for f, a in some if f.name not in BEGUN and not _shared(f)]
         empty = [array for field, array in own if field.name in EMPTY]
         rest = [array for field, array in own if field.name not in EMPTY]
-        self.own, self._size = _places([*begun, *empty, *rest])
+        self.own, self.size = _places([*begun, *empty, *rest])
         self.of_all, _ = _places([*begun, *shared])
         self.shared = np.concatenate([*map(np.ravel, [*begun, *shared]), np.zeros(1, dtype)])
         self._begun = sum(array.size for array in begun)
@@ -134,14 +139,14 @@ class _Blocks:
 
     def begin(self, kind: str, name: str, source: str, poison: bool) -> Iterator[str]:
         """Write the definition of a robot's own block."""
-        yield f"{kind} {name}[{self._size + 1}];"
+        yield f"{kind} {name}[{self.size + 1}];"
         yield f"for (int k = 0; k < {self._begun}; ++k) {name}[k] = {source}[k];"
         yield f"for (int k = {self._begun}; k < {self._known}; ++k) {name}[k] = 0;"
         for k in self._turns:
             yield f"{name}[{k}] = {name}[{k + 4}] = {name}[{k + 8}] = 1;"
         if poison:
             none = "I(123456789)" if kind == "I" else "real(NAN)"
-            yield f"for (int k = {self._known}; k < {self._size}; ++k) {name}[k] = {none};"
+            yield f"for (int k = {self._known}; k < {self.size}; ++k) {name}[k] = {none};"
 
 
 def _places(arrays: Sequence[np.ndarray]) -> tuple[dict[int, int], int]:

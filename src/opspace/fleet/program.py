@@ -43,6 +43,7 @@ class FleetProgram:
         arrays: What each task of the plan is told and tells.
         dtype: Type of the numbers, ``"float64"`` or ``"float32"``.
         device: Where it runs.
+        kind: Whom the kernel is for, ``"cpu"`` or ``"cuda"``; None is the device's own.
         poison: Begin all memory as numbers that are none, so that whatever is read before it is
             written shows.
 
@@ -50,10 +51,18 @@ class FleetProgram:
         fixed: Numbers that robots share.
         whole: Whole numbers that they share, and where the arrays of the tasks are.
         kernel: The kernel of Warp.
+        memory: Bytes of the arrays that each robot has for itself.
     """
 
     def __init__(
-        self, plan: Plan, arrays: list[TaskArrays], dtype: str, device: Any, *, poison: bool = False
+        self,
+        plan: Plan,
+        arrays: list[TaskArrays],
+        dtype: str,
+        device: Any,
+        *,
+        kind: str | None = None,
+        poison: bool = False,
     ) -> None:
         wp = warp()
         real = getattr(wp, dtype)
@@ -70,15 +79,16 @@ class FleetProgram:
                 "const real* fixed = fixed_.data; const I* whole = (const I*)whole_.data;",
                 layout.types(),
                 code,
-                layout.memory(),
+                layout.definitions(),
                 *lines[0],
                 f"{name}(work, robot);",
                 *lines[1],
                 "",
             ]
         )
-        kind = "cpu" if device.is_cpu else "cuda"
+        kind = kind or ("cpu" if device.is_cpu else "cuda")
         self.kernel = fleet_kernel(_for_compiler(text, kind), dtype, OPTIONS[kind])
+        self.memory = layout.memory_of(np.dtype(dtype).itemsize)
         self.fixed = wp.array(layout.numbers, dtype=real, device=device)
         whole = np.concatenate([layout.integers, np.array(self._addresses, np.int64)])
         self.whole = wp.array(whole, dtype=wp.int64, device=device)
@@ -96,7 +106,9 @@ def _lines(plan: Plan, arrays: list[TaskArrays], address: Any) -> tuple[list[str
         f"{{ const real* from = {_row('q')}; for (int k = 0; k < {nq}; ++k) work.q_()(k) = from[k]; }}",
         f"{{ const real* from = {_row('v')}; for (int k = 0; k < {n}; ++k) work.v_()(k) = from[k]; }}",
     ]
-    after = [f"{{ real* to = {_row('tau')}; for (int k = 0; k < {n}; ++k) to[k] = work.tau_()(k); }}"]
+    after = [
+        f"{{ real* to = {_row('tau')}; for (int k = 0; k < {n}; ++k) to[k] = work.tau_()(k); }}"
+    ]
     variables, limits = plan.size.variables, plan.size.limits
     start = f"ramps.data + (long long)i * {variables * VARIABLE_SIZE}"
     before.append(
