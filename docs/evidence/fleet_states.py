@@ -86,7 +86,9 @@ def main() -> None:
         errors[kind].append(error)
         lost[kind].append(status & int(osc.Status.LIMIT_LOST) != 0)
         wrong += none
-    print(f"{given.robot}, {sum(map(np.size, sum(errors.values(), [])))} states,", end=" ")
+    print(
+        f"{given.robot}, {sum(e.size for some in errors.values() for e in some)} states,", end=" "
+    )
     print(f"torques that are no numbers: {wrong}")
     print("| states | of which | median | 99 % | 99.9 % | worst |")
     print("| --- | --- | --- | --- | --- | --- |")

@@ -219,7 +219,7 @@ def test_nothing_is_read_before_it_is_written():
     clean.fleet.step(0.0, Q, V), fleet.step(0.0, Q, V)
     arrays = list(fleet)
     plan = fleet._controller.plan_apart(fleet._roster.present)
-    fleet._program = FleetProgram(plan, arrays, fleet.dtype, fleet.device, poison=True)
+    fleet._program = FleetProgram(plan, arrays, fleet.dtype, fleet.device, "cpu", poison=True)
     for k in range(8):
         Q, V = clean.states(rng, spread=0.4 * k, speed=2.0)
         tau = fleet.step(0.001 * k, Q, V).numpy()

@@ -38,13 +38,17 @@ def test_steps_read_and_write_tensors_where_they_lie(both):
 
 def test_what_a_task_is_told_and_tells_is_shared_with_tensors(both):
     fleet, (q, v) = both.fleet, tensors(both)
-    told = {name: wp.to_torch(getattr(fleet["position"], name)) for name in ("target", "activation")}
+    told = {
+        name: wp.to_torch(getattr(fleet["position"], name)) for name in ("target", "activation")
+    }
     error, tau = wp.to_torch(fleet["position"].error), wp.to_torch(fleet.tau)
     fleet.step(0.0, q, v)
     before, torque = error.clone(), tau.clone()
     told["target"] += torch.tensor([0.0, 0.0, 0.1])
     fleet.step(0.0, q, v)
-    torch.testing.assert_close(error - before, torch.tensor([[0.0, 0.0, 0.1]]).double().expand(6, 3))
+    torch.testing.assert_close(
+        error - before, torch.tensor([[0.0, 0.0, 0.1]]).double().expand(6, 3)
+    )
     assert not torch.equal(tau, torque)
     told["activation"][2] = 0.0
     fleet.step(0.0, q, v)
@@ -65,7 +69,7 @@ def test_robots_are_named_by_tensors(both):
 
 def test_tensors_of_another_type_or_shape_are_refused_by_name(both):
     fleet, (q, v) = both.fleet, tensors(both)
-    with pytest.raises(osc.InputError, match="q must have .* numbers of float64"):
+    with pytest.raises(osc.InputError, match=r"q must have .* numbers of float64"):
         fleet.step(0.0, q.float(), v)
     with pytest.raises(osc.InputError, match=r"v must have shape \(6, 6\)"):
         fleet.step(0.0, q, v[:3])

@@ -43,7 +43,8 @@ class RobotLayout:
 
     Args:
         tick: The plan's arrays, as a new plan has them.
-        records: Other records by their names in C++, whose arrays every robot has for itself.
+        records: Other records by their names in C++, whose arrays every robot has for itself; the
+            tick's own reaches them by these names.
         poison: Whether memory that nothing has to begin begins as numbers that are none.
 
     Attributes:
@@ -55,7 +56,7 @@ class RobotLayout:
         self, tick: Record, records: Mapping[str, Record], *, poison: bool = False
     ) -> None:
         self._poison = poison
-        self._records = {"work": tick, **records}
+        self._records = {**records, "work": tick}
         self._kinds: dict[tuple[str, tuple[int, ...]], str] = {}
         self._option = tick.option
         found = {id(a): (f, a) for r in self._records.values() for f, a in _arrays(r) if a.size}
@@ -94,6 +95,12 @@ class RobotLayout:
             parts.append(
                 f"CUDA_CALLABLE {kind} {field.name}_() const {{ return {kind}{{{place}}}; }}"
             )
+        if name == "work":
+            others = (other for other in self._records if other != name)
+            parts += [
+                f"CUDA_CALLABLE Of_{other} {other}_() const {{ return Of_{other}{{{BLOCKS}}}; }}"
+                for other in others
+            ]
         yield f"struct Of_{name} {{ {' '.join(parts)} }};"
 
     def _kind(self, name: str, array: np.ndarray) -> str:

@@ -48,6 +48,10 @@ class TaskArrays:
         activation: A factor of the task's presence in the stack, 0 to 1.
         error: (m,) x_d − x at the last step, m, rad.
         presence: h at the last step, activation included.
+        pose: (7,) position and quaternion wxyz of what the task controls; this and the next two where
+            a fleet is given the dynamics, for tasks of motion.
+        jacobian: (6, n) of that, linear rows first.
+        drift: (6,) J̇ q̇ of it.
     """
 
     def __init__(self, task: TrackingTask, count: int, dtype: Any, device: Any) -> None:
@@ -55,12 +59,19 @@ class TaskArrays:
         self.name = task.name
         self._count, self._dtype, self._device = count, dtype, device
         self._size = 0
-        self._joints = False
+        self._joints = self._given = False
         self._start = 0
         self._wishes = np.full(count, task.target is None)
 
-    def begin(self, tick: Record, i: int, rows: slice) -> None:
-        """Take what the task is told from the arrays of a plan in which it is the task ``i``."""
+    def begin(self, tick: Record, i: int, rows: slice, *, given: bool) -> None:
+        """Take what the task is told from the arrays of a plan in which it is the task ``i``.
+
+        Args:
+            tick: The arrays.
+            i: Number of the task.
+            rows: Its rows.
+            given: Whether its motion is given.
+        """
         if self._size:
             return
         kind, number = tick.kind[i], tick.numbers[i]
@@ -80,6 +91,11 @@ class TaskArrays:
             self._size = target.size
             velocity = number[GOAL_VELOCITY : GOAL_VELOCITY + size]
             acceleration = number[GOAL_ACCELERATION : GOAL_ACCELERATION + size]
+            if given:
+                self._given = True
+                self.pose = self._filled(np.eye(7)[3])
+                self.jacobian = self._filled(np.zeros((6, tick.v.size)))
+                self.drift = self._filled(np.zeros(6))
         self.target, self.velocity, self.acceleration = map(
             self._filled, (target, velocity, acceleration)
         )
@@ -160,6 +176,9 @@ class TaskArrays:
                 place = f"robot.joint_{name}_().p + {first}"
             way = "in, out where found" if name == "target" else "in"
             yield way, getattr(self, name), f"({place})"
+        for name in ("pose", "jacobian", "drift") if self._given else ():
+            array = getattr(self, name)
+            yield "in", array, f"(robot.{name}_().p + {i * int(np.prod(array.shape[1:]))})"
         yield "in", self.kp, f"(work.kp_().p + {first})"
         yield "in", self.kv, f"(work.kv_().p + {first})"
         yield "in", self.activation, f"(work.own_().p + {i})"
