@@ -419,7 +419,7 @@ def _bench_fleet(out: Path) -> None:
     print("fleets compile their kernels first, some ten seconds each", file=sys.stderr)
     rows = fleet_steps()
     _print_table(FLEET_HEADS, rows)
-    print("cpu is one core; opspace computes the dynamics too and keeps joint limits")
+    print("cpu is one core; fleets compute the dynamics unless given, and keep joint limits")
     if not newton_is_installed():
         print("Newton is not installed (pip install newton): no controller was timed beside")
     out.mkdir(parents=True, exist_ok=True)

@@ -65,6 +65,7 @@ class Fleet:
         tau: (count, n) torque of the last step that was given none to write to, N·m.
         status: (count,) what happened in it, in the numbers of `Status`.
         hard_solves: (count,) hard torques that were computed.
+        given: Whether dynamics are given.
         M: (count, n, n) inertia if dynamics are given, kg·m²; zero, a fault, until it is written.
         bias: (count, n) torque that holds the joints at zero acceleration then, N·m.
         limits: (count, sides) how much each joint limit acts, in the order of ``limit_names``.
@@ -108,18 +109,18 @@ class Fleet:
             period=period,
         )
         check_robot(self._controller)
-        self._given = check_dynamics(dynamics, period)
+        self.given = check_dynamics(dynamics, period)
         self.robot = robot
         self._roster = Roster(count)
         self._arrays: dict[str, TaskArrays] = {}
         for level, tasks in stack.levels_by_number.items():
             for task in tasks:
-                self._roster.start_with(check_task(task, given=self._given), level)
+                self._roster.start_with(check_task(task, given=self.given), level)
         n, sides = robot.nv, stack.limits.sides if stack.limits else ()
         self.limit_names = tuple(side.name for side in sides)
         self.tau = self._zeros((count, n))
         self.limits = self._zeros((count, len(sides)))
-        if self._given:
+        if self.given:
             self.M, self.bias = self._zeros((count, n, n)), self._zeros((count, n))
         self.status = wp.zeros(count, dtype=wp.int32, device=self.device)
         self.hard_solves = wp.zeros(count, dtype=wp.int32, device=self.device)
@@ -239,7 +240,7 @@ class Fleet:
         timing, mask = Timing(duration, profile), robots_of(robots, self.count)
         number, roster = checked_level(level), self._roster
         if not isinstance(task, str) and checked_task(task).name not in roster.members:
-            self._controller.stack.prepare(check_task(task, given=self._given))
+            self._controller.stack.prepare(check_task(task, given=self.given))
             roster.take_in(task, number)
         roster.insert(task, number, mask, timing)
 
@@ -339,7 +340,7 @@ class Fleet:
             kind: ``"cpu"`` or ``"cuda"``.
         """
         assert self._plan is not None
-        given = (self.M, self.bias) if self._given else None
+        given = (self.M, self.bias) if self.given else None
         arrays = list(self._arrays.values())
         return FleetProgram(self._plan, arrays, self.dtype, self.device, kind, given=given)
 
@@ -352,7 +353,7 @@ class Fleet:
                 self._arrays[name] = TaskArrays(member.task, self.count, self._real, self.device)
         arrays = list(self._arrays.values())
         for one, packed in zip(arrays, plan.packed, strict=True):
-            one.begin(plan.tick, packed.index, packed.rows, given=self._given)
+            one.begin(plan.tick, packed.index, packed.rows, given=self.given)
         groups = np.zeros((self.count, len(plan.variables)), np.int64)
         if before is not None:
             old = self._groups.numpy()

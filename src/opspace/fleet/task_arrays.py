@@ -48,8 +48,9 @@ class TaskArrays:
         activation: A factor of the task's presence in the stack, 0 to 1.
         error: (m,) x_d − x at the last step, m, rad.
         presence: h at the last step, activation included.
-        pose: (7,) position and quaternion wxyz of what the task controls; this and the next two where
-            a fleet is given the dynamics, for tasks of motion.
+        told_motion: Whether it is told the three that follow: a task of motion in a fleet that is given
+            the dynamics.
+        pose: (7,) position and quaternion wxyz of what the task controls.
         jacobian: (6, n) of that, linear rows first.
         drift: (6,) J̇ q̇ of it.
     """
@@ -59,7 +60,8 @@ class TaskArrays:
         self.name = task.name
         self._count, self._dtype, self._device = count, dtype, device
         self._size = 0
-        self._joints = self._given = False
+        self._joints = False
+        self.told_motion = False
         self._start = 0
         self._wishes = np.full(count, task.target is None)
 
@@ -92,7 +94,7 @@ class TaskArrays:
             velocity = number[GOAL_VELOCITY : GOAL_VELOCITY + size]
             acceleration = number[GOAL_ACCELERATION : GOAL_ACCELERATION + size]
             if given:
-                self._given = True
+                self.told_motion = True
                 self.pose = self._filled(np.eye(7)[3])
                 self.jacobian = self._filled(np.zeros((6, tick.v.size)))
                 self.drift = self._filled(np.zeros(6))
@@ -176,7 +178,7 @@ class TaskArrays:
                 place = f"robot.joint_{name}_().p + {first}"
             way = "in, out where found" if name == "target" else "in"
             yield way, getattr(self, name), f"({place})"
-        for name in ("pose", "jacobian", "drift") if self._given else ():
+        for name in ("pose", "jacobian", "drift") if self.told_motion else ():
             array = getattr(self, name)
             yield "in", array, f"(robot.{name}_().p + {i * int(np.prod(array.shape[1:]))})"
         yield "in", self.kp, f"(work.kp_().p + {first})"
