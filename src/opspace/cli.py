@@ -368,16 +368,29 @@ def bench(
     against: Annotated[
         Path | None, typer.Option(help="JSON file of an earlier run to compare with.")
     ] = None,
+    arch: Annotated[
+        str | None,
+        typer.Option(
+            help="With fleet: compile it for this kind of graphics card, as sm_90, which need not "
+            "be there, and tell what a robot takes of it."
+        ),
+    ] = None,
     out: Annotated[Path, typer.Option(help="Directory to write to.")] = Path("results/bench"),
 ) -> None:
     """Time the tick, in turns with the model's own calls and with other controllers."""
     from opspace.bench import Benchmark, changes_table, compare_runs, run_benchmark
+    from opspace.errors import InputError
     from opspace.plots import save
     from opspace.plots.benchmark import benchmark_figure
 
     before = None if against is None else Benchmark.load(against)
+    if arch is not None and (not scenes or "fleet" not in scenes):
+        raise InputError("--arch is for opspace bench fleet")
     if scenes and "fleet" in scenes:
-        _bench_fleet(out)
+        if arch is None:
+            _bench_fleet(out)
+        else:
+            _fleet_on_card(arch)
         scenes = [name for name in scenes if name != "fleet"]
         if not scenes:
             return
@@ -401,19 +414,31 @@ def bench(
 
 
 def _bench_fleet(out: Path) -> None:
-    """Time fleets, and say where."""
-    from opspace.bench import FLEET_HEADS, fleet_steps
+    """Time fleets, and say where and beside what."""
+    from opspace.bench import FLEET_HEADS, fleet_steps, newton_is_installed
 
     print("fleets compile their kernels first, some ten seconds each", file=sys.stderr)
     rows = fleet_steps()
     _print_table(FLEET_HEADS, rows)
-    print("one core of this machine's processor; no graphics card was measured")
+    print("cpu is one core; fleets compute the dynamics unless given, and keep joint limits")
+    if not newton_is_installed():
+        print("Newton is not installed (pip install newton): no controller was timed beside")
     out.mkdir(parents=True, exist_ok=True)
     content = [dict(zip(FLEET_HEADS, row, strict=True)) for row in rows]
     (out / "fleet.json").write_text(
         json.dumps(content, indent=1, ensure_ascii=False) + "\n", "utf-8"
     )
     print(f"results: {out}")
+
+
+def _fleet_on_card(arch: str) -> None:
+    """Tell what a robot of a fleet takes of a graphics card."""
+    from opspace.bench import CARD_HEADS, fleet_on_card
+
+    rows = fleet_on_card(arch)
+    _print_table(CARD_HEADS, rows)
+    if any("not known" in row for row in rows):
+        print("a new ptxas tells what is spilled: pip install nvidia-cuda-nvcc")
 
 
 @app.command(epilog="Example: opspace sweep showpiece --vary tasks.position.kp=20..200 --runs 50")

@@ -76,16 +76,18 @@ def programs_of(page):
 WITH_PROGRAMS = [
     page for page in PAGES if any(block.language == "python" for block in programs_of(page))
 ]
-EXTRAS = {"docs/how-to/fleet.md": ("gpu", "warp")}
-"""Pages that need an extra, and the package that it brings."""
+EXTRAS = {
+    "docs/how-to/fleet.md": ["warp"],
+    "docs/how-to/fleet-training.md": ["warp", "mujoco", "mujoco_warp", "torch"],
+}
+"""Pages that need packages which are not always there."""
 WITH_FILES = [page for page in PAGES if any(block.title for block in programs_of(page))]
 
 
 @pytest.mark.parametrize("page", sorted({*WITH_PROGRAMS, *WITH_FILES}), ids=name_of)
 def test_the_code_blocks_run_in_order(page, tmp_path):
-    if name_of(page) in EXTRAS:
-        extra, package = EXTRAS[name_of(page)]
-        pytest.importorskip(package, reason=f"{name_of(page)} needs pip install 'opspace[{extra}]'")
+    for package in EXTRAS.get(name_of(page), ()):
+        pytest.importorskip(package, reason=f"{name_of(page)} needs {package}")
     done = run_blocks(programs_of(page), tmp_path)
     assert done.returncode == 0, done.stderr
 

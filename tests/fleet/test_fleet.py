@@ -149,15 +149,6 @@ def test_times_on_the_device_and_a_place_for_the_torques():
     assert (wide[:, 0] == 0.0).all()
 
 
-def test_tensors_of_torch_are_not_copied():
-    torch = pytest.importorskip("torch", reason="torch is not installed")
-    both = Beside(alone=True).prepare()
-    Q, V = both.states(np.random.default_rng(7))
-    tau = torch.zeros(Q.shape, dtype=torch.float64)
-    assert both.fleet.step(0.0, torch.from_numpy(Q), torch.from_numpy(V), tau) is tau
-    np.testing.assert_array_equal(tau.numpy(), both.fleet.step(0.0, Q, V).numpy())
-
-
 REFUSED = {
     "needs a wrench": lambda: osc.ForceTask(name="press"),
     "reference in time": lambda: osc.PositionTask(target=osc.Circle([0.4, 0.0, 0.3], 0.1, 2.0)),
@@ -228,7 +219,7 @@ def test_nothing_is_read_before_it_is_written():
     clean.fleet.step(0.0, Q, V), fleet.step(0.0, Q, V)
     arrays = list(fleet)
     plan = fleet._controller.plan_apart(fleet._roster.present)
-    fleet._program = FleetProgram(plan, arrays, fleet.dtype, fleet.device, poison=True)
+    fleet._program = FleetProgram(plan, arrays, fleet.dtype, fleet.device, "cpu", poison=True)
     for k in range(8):
         Q, V = clean.states(rng, spread=0.4 * k, speed=2.0)
         tau = fleet.step(0.001 * k, Q, V).numpy()

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from opspace.controller import Controller
-from opspace.errors import InputError
-from opspace.kernels.columns import OWN
+from opspace.errors import InputError, unknown_name
+from opspace.kernels.columns import MOMENTUM, OWN
 from opspace.plan.pack_task import kind_of
 from opspace.tasks import ForceTask, ImpedanceTask, Task, TrackingTask
 
@@ -29,8 +29,32 @@ def check_robot(controller: Controller) -> None:
         )
 
 
-def check_task(task: Task) -> TrackingTask:
+DYNAMICS = ("own", "given")
+
+
+def check_dynamics(dynamics: str, period: float | None) -> bool:
+    """Tell whether dynamics are given.
+
+    Raises:
+        UnknownNameError: They come from elsewhere.
+        InputError: They are needed between two steps, too.
+    """
+    if dynamics not in DYNAMICS:
+        raise unknown_name("dynamics", dynamics, DYNAMICS)
+    if dynamics == "given" and period is not None:
+        raise InputError(
+            "with a period, joint limits need the dynamics between two steps as well; a fleet with "
+            "dynamics='given' takes none"
+        )
+    return dynamics == "given"
+
+
+def check_task(task: Task, *, given: bool) -> TrackingTask:
     """Return a task that a fleet can evaluate.
+
+    Args:
+        task: The task.
+        given: Whether dynamics are given.
 
     Raises:
         InputError: It cannot.
@@ -40,6 +64,8 @@ def check_task(task: Task) -> TrackingTask:
         raise InputError(f"{what} needs a wrench; a fleet takes tasks of motion and of joints")
     if kind_of(task) == OWN or not isinstance(task, TrackingTask):
         raise InputError(f"{what} is evaluated in Python; a fleet takes the library's own tasks")
+    if given and kind_of(task) == MOMENTUM:
+        raise InputError(f"{what} needs the robot's own dynamics; they are given")
     if task.activation is not None:
         raise InputError(
             f"{what} has an activation of its own, which is Python; write what it would give into "

@@ -9,7 +9,7 @@ import numpy as np
 
 from opspace.controller import Controller
 from opspace.errors import InputError
-from opspace.fleet.check_fleet import check_robot, check_task
+from opspace.fleet.check_fleet import check_dynamics, check_robot, check_task
 from opspace.fleet.precision import dtype_name
 from opspace.fleet.program import FleetProgram
 from opspace.fleet.roster import Roster
@@ -53,6 +53,9 @@ class Fleet:
         torque_limits: See `Controller`.
         period: Time between two steps, s, if joint limits shall count how accelerations change
             between two steps; no step is checked for being late.
+        dynamics: ``"own"``: the kernel computes them from the robot's file. ``"given"``: every step
+            takes them from arrays, which a simulator writes: ``M`` and ``bias`` of the fleet, and
+            ``pose``, ``jacobian`` and ``drift`` of each task of motion.
 
     Attributes:
         robot: The robot.
@@ -62,6 +65,9 @@ class Fleet:
         tau: (count, n) torque of the last step that was given none to write to, N·m.
         status: (count,) what happened in it, in the numbers of `Status`.
         hard_solves: (count,) hard torques that were computed.
+        given: Whether dynamics are given.
+        M: (count, n, n) inertia if dynamics are given, kg·m²; zero, a fault, until it is written.
+        bias: (count, n) torque that holds the joints at zero acceleration then, N·m.
         limits: (count, sides) how much each joint limit acts, in the order of ``limit_names``.
 
     Raises:
@@ -83,6 +89,7 @@ class Fleet:
         damping: float = 10.0,
         torque_limits: str = "report",
         period: float | None = None,
+        dynamics: str = "own",
     ) -> None:
         if isinstance(count, bool) or not isinstance(count, int) or count < 1:
             raise InputError(f"a fleet has at least one robot, got {count!r}")
@@ -102,16 +109,19 @@ class Fleet:
             period=period,
         )
         check_robot(self._controller)
+        self.given = check_dynamics(dynamics, period)
         self.robot = robot
         self._roster = Roster(count)
         self._arrays: dict[str, TaskArrays] = {}
         for level, tasks in stack.levels_by_number.items():
             for task in tasks:
-                self._roster.start_with(check_task(task), level)
+                self._roster.start_with(check_task(task, given=self.given), level)
         n, sides = robot.nv, stack.limits.sides if stack.limits else ()
         self.limit_names = tuple(side.name for side in sides)
         self.tau = self._zeros((count, n))
         self.limits = self._zeros((count, len(sides)))
+        if self.given:
+            self.M, self.bias = self._zeros((count, n, n)), self._zeros((count, n))
         self.status = wp.zeros(count, dtype=wp.int32, device=self.device)
         self.hard_solves = wp.zeros(count, dtype=wp.int32, device=self.device)
         self._time = wp.zeros(1, dtype=wp.float64, device=self.device)
@@ -230,7 +240,7 @@ class Fleet:
         timing, mask = Timing(duration, profile), robots_of(robots, self.count)
         number, roster = checked_level(level), self._roster
         if not isinstance(task, str) and checked_task(task).name not in roster.members:
-            self._controller.stack.prepare(check_task(task))
+            self._controller.stack.prepare(check_task(task, given=self.given))
             roster.take_in(task, number)
         roster.insert(task, number, mask, timing)
 
@@ -323,6 +333,17 @@ class Fleet:
 
     # --- Layout ----------------------------------------------------------------------------------
 
+    def program_for(self, kind: str) -> FleetProgram:
+        """Make the program of the tasks and levels of the last step for another kind of device.
+
+        Args:
+            kind: ``"cpu"`` or ``"cuda"``.
+        """
+        assert self._plan is not None
+        given = (self.M, self.bias) if self.given else None
+        arrays = list(self._arrays.values())
+        return FleetProgram(self._plan, arrays, self.dtype, self.device, kind, given=given)
+
     def _lay_out(self) -> None:
         """Make the plan, the kernel and the arrays for the tasks and levels that there are."""
         roster, before = self._roster, self._plan
@@ -332,7 +353,7 @@ class Fleet:
                 self._arrays[name] = TaskArrays(member.task, self.count, self._real, self.device)
         arrays = list(self._arrays.values())
         for one, packed in zip(arrays, plan.packed, strict=True):
-            one.begin(plan.tick, packed.index, packed.rows)
+            one.begin(plan.tick, packed.index, packed.rows, given=self.given)
         groups = np.zeros((self.count, len(plan.variables)), np.int64)
         if before is not None:
             old = self._groups.numpy()
@@ -342,8 +363,8 @@ class Fleet:
         wp = warp()
         self._groups = wp.array(groups, dtype=wp.int64, device=self.device)
         self._ramps = wp.array(roster.ramps(plan.variables), dtype=wp.float64, device=self.device)
-        self._program = FleetProgram(plan, arrays, self.dtype, self.device)
         self._plan = plan
+        self._program = self.program_for("cpu" if self.device.is_cpu else "cuda")
 
     def _zeros(self, shape: tuple[int, ...]) -> Any:
         return warp().zeros(shape, dtype=self._real, device=self.device)

@@ -13,7 +13,7 @@ import inspect
 import math
 import textwrap
 from collections.abc import Callable, Mapping
-from types import FunctionType, ModuleType
+from types import FunctionType, MappingProxyType, ModuleType
 from typing import Any, TypeAlias
 
 from opspace.errors import InputError
@@ -32,19 +32,24 @@ FUNCTIONS = {
 """What `math` and powers are there."""
 
 PRELUDE = """\
-auto value = [](auto x) { return x; };
-auto smaller = [](auto a, auto b) { return b < a ? b : a; };
-auto larger = [](auto a, auto b) { return b > a ? b : a; };
+static constexpr auto value = [](auto x) { return x; };
+static constexpr auto smaller = [](auto a, auto b) { return b < a ? b : a; };
+static constexpr auto larger = [](auto a, auto b) { return b > a ? b : a; };
 """
 """Smaller and larger answer as Python's do where a number is none."""
 
 
-def translate(root: Callable[..., Any], constants: Mapping[str, float]) -> tuple[str, str]:
+def translate(
+    root: Callable[..., Any],
+    constants: Mapping[str, float],
+    instead: Mapping[Callable[..., Any], Callable[..., Any]] = MappingProxyType({}),
+) -> tuple[str, str]:
     """Write a kernel and whatever it calls as C++ lambdas, each after those that it calls.
 
     Args:
         root: The kernel, as numba has it or as plain Python.
         constants: Numbers that replace constants of the modules, by name.
+        instead: Kernels that are called instead of others.
 
     Returns:
         The code, and the name of the kernel's lambda.
@@ -52,7 +57,7 @@ def translate(root: Callable[..., Any], constants: Mapping[str, float]) -> tuple
     Raises:
         InputError: A statement that has no counterpart.
     """
-    found = _Program(constants)
+    found = _Program(constants, instead)
     name = found.require(root)
     return PRELUDE + "\n".join(found.code), name
 
@@ -60,13 +65,19 @@ def translate(root: Callable[..., Any], constants: Mapping[str, float]) -> tuple
 class _Program:
     """Lambdas in the order in which they are needed."""
 
-    def __init__(self, constants: Mapping[str, float]) -> None:
+    def __init__(
+        self,
+        constants: Mapping[str, float],
+        instead: Mapping[Callable[..., Any], Callable[..., Any]],
+    ) -> None:
         self.constants = constants
+        self._instead = instead
         self.code: list[str] = []
         self._names: dict[Any, str] = {}
 
     def require(self, function: Any) -> str:
         """Translate a function unless that is done, and return its name."""
+        function = self._instead.get(function, function)
         plain = getattr(function, "py_func", function)
         key = plain.__code__
         if key not in self._names:
@@ -101,7 +112,9 @@ class _Function(ast.NodeVisitor):
         """Return the lambda."""
         given = ", ".join(f"auto {name}_" for name in self._parameters)
         self._block(self._tree.body)
-        return "\n".join([f"auto {self._name} = [&]({given}) {{", *self._lines, "};"])
+        return "\n".join(
+            [f"static constexpr auto {self._name} = []({given}) {{", *self._lines, "};"]
+        )
 
     # --- Statements ------------------------------------------------------------------------------
 
@@ -247,7 +260,7 @@ class _Function(ast.NodeVisitor):
     def _say_Attribute(self, node: ast.Attribute) -> str:
         if isinstance(node.value, ast.Name) and self._globals.get(node.value.id) is math:
             return _number(getattr(math, node.attr))
-        return f"{self._say(node.value)}.{node.attr}_"
+        return f"{self._say(node.value)}.{node.attr}_()"
 
     def _say_Subscript(self, node: ast.Subscript) -> str:
         if isinstance(node.value, ast.Attribute) and node.value.attr == "shape":

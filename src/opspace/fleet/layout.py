@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -32,13 +32,19 @@ EMPTY = (
 )
 """What a tick does not write everywhere and reads as zero there: a fleet stands on nothing."""
 
+BLOCKS = "numbers, integers, fixed, whole"
+
 
 class RobotLayout:
-    """All arrays of a plan: what robots share, in two blocks, and what each works in.
+    """All arrays of a plan: what robots share, in two blocks, and what each works in, in two others.
+
+    A record in C++ is where the four blocks begin, and each of its arrays a place in one of them that
+    the compiler knows.
 
     Args:
         tick: The plan's arrays, as a new plan has them.
-        records: Other records by their names in C++, whose arrays every robot has for itself.
+        records: Other records by their names in C++, whose arrays every robot has for itself; the
+            tick's own reaches them by these names.
         poison: Whether memory that nothing has to begin begins as numbers that are none.
 
     Attributes:
@@ -50,107 +56,123 @@ class RobotLayout:
         self, tick: Record, records: Mapping[str, Record], *, poison: bool = False
     ) -> None:
         self._poison = poison
+        self._records = {**records, "work": tick}
         self._kinds: dict[tuple[str, tuple[int, ...]], str] = {}
-        self._structs: list[str] = []
-        self._memory: dict[int, str] = {}
-        self._lines: list[str] = []
-        self._shared: tuple[list[np.ndarray], list[np.ndarray]] = ([], [])
-        self._sizes = [0, 0]
         self._option = tick.option
-        self._record("work", tick)
-        for name, record in records.items():
-            self._record(name, record)
-        self.numbers, self.integers = (
-            np.concatenate([*map(np.ravel, found), np.zeros(1)]) for found in self._shared
-        )
+        found = {id(a): (f, a) for r in self._records.values() for f, a in _arrays(r) if a.size}
+        self._blocks = [_Blocks(found.values(), dtype) for dtype in (np.float64, np.int64)]
+        self._structs = [
+            text for name, record in self._records.items() for text in self._struct(name, record)
+        ]
+        self.numbers, self.integers = (blocks.shared for blocks in self._blocks)
 
     def types(self) -> str:
         """Return the types of all arrays and records."""
         return "\n".join([*_array_types(self._kinds, self._frozen()), *self._structs])
 
-    def memory(self) -> str:
+    def memory_of(self, number: int) -> int:
+        """Return how many bytes a robot has for itself if a number has so many."""
+        numbers, integers = self._blocks
+        return numbers.size * number + integers.size * 8
+
+    def definitions(self) -> str:
         """Return the definitions of all records, for one robot."""
-        return "\n".join(self._lines)
+        numbers, integers = self._blocks
+        lines = [*numbers.begin("real", "numbers", "fixed", self._poison)]
+        lines += integers.begin("I", "integers", "whole", self._poison)
+        lines += [f"const Of_{name} {name}{{{BLOCKS}}};" for name in self._records]
+        return "\n".join(lines)
 
-    def _record(self, name: str, record: Record) -> None:
-        fields: list[str] = []
-        self._lines.append(f"Of_{name} {name};")
-        for path, field, array in _arrays(record, ""):
-            kind = self._kind(path, array)
-            memory = self._memory.get(id(array))
-            if memory is None or not array.size:
-                memory = self._memory[id(array)] = self._begin(field, path, array)
-            fields.append(f"{name}.{path} = {kind}{{{memory}}};")
-        self._structs += _structs(f"Of_{name}", record, self._kind)
-        self._lines += fields
+    def _struct(self, name: str, record: Record) -> Iterator[str]:
+        """Write the type of a record, after those of the records in it."""
+        parts = ["real* numbers; I* integers; const real* fixed; const I* whole;"]
+        for field, value in zip(record._table.fields, record, strict=True):
+            if isinstance(value, Record):
+                yield from self._struct(f"{name}_{field.name}", value)
+                kind, place = f"Of_{name}_{field.name}", BLOCKS
+            else:
+                kind, place = self._kind(field.name, value), self._place(value)
+            parts.append(
+                f"CUDA_CALLABLE {kind} {field.name}_() const {{ return {kind}{{{place}}}; }}"
+            )
+        if name == "work":
+            others = (other for other in self._records if other != name)
+            parts += [
+                f"CUDA_CALLABLE Of_{other} {other}_() const {{ return Of_{other}{{{BLOCKS}}}; }}"
+                for other in others
+            ]
+        yield f"struct Of_{name} {{ {' '.join(parts)} }};"
 
-    def _kind(self, path: str, array: np.ndarray) -> str:
-        if path == "option_":
+    def _kind(self, name: str, array: np.ndarray) -> str:
+        if name == "option":
             return "Options"
         key = ("I" if array.dtype == np.int64 else "real"), array.shape
         return self._kinds.setdefault(key, "_".join([key[0], *map(str, array.shape)]))
 
-    def _begin(self, field: Field, path: str, array: np.ndarray) -> str:
-        """Say where an array begins: among what is shared, or in memory of its own."""
-        whole = int(array.dtype == np.int64)
+    def _place(self, array: np.ndarray) -> str:
+        """Say where an array begins."""
+        whole = array.dtype == np.int64
         kind = "I" if whole else "real"
         if not array.size:
             return f"({kind}*)0"
-        shared = set(field.writer.split(", ")) <= {"plan", "robot"} and field.lives in (
-            "plan",
-            "robot",
-        )
-        place = ""
-        if shared or field.name in BEGUN:
-            place = f"({kind}*){'whole' if whole else 'fixed'} + {self._sizes[whole]}"
-            self._shared[whole].append(array)
-            self._sizes[whole] += array.size
-        if shared:
-            return place
-        name = f"at_{len(self._memory)}"
-        if place:
-            self._lines.append(
-                f"{kind} {name}[{array.size}]; for (int k = 0; k < {array.size}; ++k) "
-                f"{name}[k] = ({place})[k];"
-            )
-        elif field.name in EMPTY:
-            self._lines.append(f"{kind} {name}[{array.size}] = {{}};")
-            if field.name == "placement":
-                self._lines.append(f"{name}[0] = {name}[4] = {name}[8] = real(1);")
-        elif self._poison:
-            none = "I(123456789)" if whole else "real(NAN)"
-            self._lines.append(
-                f"{kind} {name}[{array.size}]; for (int k = 0; k < {array.size}; ++k) "
-                f"{name}[k] = {none};"
-            )
-        else:
-            self._lines.append(f"{kind} {name}[{array.size}];")
-        return name
+        blocks = self._blocks[whole]
+        if id(array) in blocks.own:
+            return f"{'integers' if whole else 'numbers'} + {blocks.own[id(array)]}"
+        return f"({kind}*){'whole' if whole else 'fixed'} + {blocks.of_all[id(array)]}"
 
     def _frozen(self) -> dict[int, float]:
         return {i: float(self._option[i]) for i in FROZEN}
 
 
-def _arrays(record: Record, prefix: str) -> Iterator[tuple[str, Field, np.ndarray]]:
-    for field, value in zip(record._table.fields, record, strict=True):
-        path = f"{prefix}{field.name}_"
-        if isinstance(value, Record):
-            yield from _arrays(value, f"{path}.")
-        else:
-            yield path, field, value
+class _Blocks:
+    """Numbers of one type: a block that robots share, and one that each has for itself.
+
+    What a robot begins as the plan begins it comes first in both, what begins as zero next.
+    """
+
+    def __init__(self, arrays: Iterable[tuple[Field, np.ndarray]], dtype: type) -> None:
+        some = [(field, array) for field, array in arrays if array.dtype == dtype]
+        begun = [array for field, array in some if field.name in BEGUN]
+        shared = [array for field, array in some if field.name not in BEGUN and _shared(field)]
+        own = [(f, a) for f, a in some if f.name not in BEGUN and not _shared(f)]
+        empty = [array for field, array in own if field.name in EMPTY]
+        rest = [array for field, array in own if field.name not in EMPTY]
+        self.own, self.size = _places([*begun, *empty, *rest])
+        self.of_all, _ = _places([*begun, *shared])
+        self.shared = np.concatenate([*map(np.ravel, [*begun, *shared]), np.zeros(1, dtype)])
+        self._begun = sum(array.size for array in begun)
+        self._known = self._begun + sum(array.size for array in empty)
+        self._turns = [self.own[id(a)] for f, a in own if f.name == "placement"]
+
+    def begin(self, kind: str, name: str, source: str, poison: bool) -> Iterator[str]:
+        """Write the definition of a robot's own block."""
+        yield f"{kind} {name}[{self.size + 1}];"
+        yield f"for (int k = 0; k < {self._begun}; ++k) {name}[k] = {source}[k];"
+        yield f"for (int k = {self._begun}; k < {self._known}; ++k) {name}[k] = 0;"
+        for k in self._turns:
+            yield f"{name}[{k}] = {name}[{k + 4}] = {name}[{k + 8}] = 1;"
+        if poison:
+            none = "I(123456789)" if kind == "I" else "real(NAN)"
+            yield f"for (int k = {self._known}; k < {self.size}; ++k) {name}[k] = {none};"
 
 
-def _structs(name: str, record: Record, kind: Callable[[str, np.ndarray], str]) -> list[str]:
-    found: list[str] = []
-    fields: list[str] = []
+def _places(arrays: Sequence[np.ndarray]) -> tuple[dict[int, int], int]:
+    """Put arrays one behind the other, and return where each begins and where the last ends."""
+    ends = [0, *itertools.accumulate(array.size for array in arrays)]
+    return {id(array): start for array, start in zip(arrays, ends, strict=False)}, ends[-1]
+
+
+def _shared(field: Field) -> bool:
+    """Tell whether an array is the same for all robots."""
+    return set(field.writer.split(", ")) <= {"plan", "robot"} and field.lives in ("plan", "robot")
+
+
+def _arrays(record: Record) -> Iterator[tuple[Field, np.ndarray]]:
     for field, value in zip(record._table.fields, record, strict=True):
         if isinstance(value, Record):
-            inner = f"{name}_{field.name}"
-            found += _structs(inner, value, kind)
-            fields.append(f"{inner} {field.name}_;")
+            yield from _arrays(value)
         else:
-            fields.append(f"{kind(f'{field.name}_', value)} {field.name}_;")
-    return [*found, f"struct {name} {{ {' '.join(fields)} }};"]
+            yield field, value
 
 
 def _array_types(

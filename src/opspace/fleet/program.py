@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from opspace.fleet.fleet_kernel import fleet_kernel
+from opspace.fleet.given_motion import INSTEAD
 from opspace.fleet.kernels_in_cpp import translate
 from opspace.fleet.layout import RobotLayout
 from opspace.fleet.one_robot import robot_tick
@@ -23,7 +24,7 @@ START = 2
 """Column of an activation in time that holds when it starts."""
 
 LOOP = re.compile(r"^( *)(for \(I )", re.M)
-LAMBDA = re.compile(r"^(auto \w+ = \[&\]\([^)]*\)) \{$", re.M)
+LAMBDA = re.compile(r"^(static constexpr auto \w+ = \[\]\([^)]*\)) \{$", re.M)
 ROLLED = {"cpu": '_Pragma("clang loop unroll(disable)")', "cuda": '_Pragma("unroll 1")'}
 """Loops stay loops: rolled out they take a compiler many times as long."""
 
@@ -42,7 +43,9 @@ class FleetProgram:
         plan: A plan that nothing else uses.
         arrays: What each task of the plan is told and tells.
         dtype: Type of the numbers, ``"float64"`` or ``"float32"``.
-        device: Where it runs.
+        device: Where the arrays are.
+        kind: What the kernel is for, ``"cpu"`` or ``"cuda"``.
+        given: Inertia and bias of every robot if dynamics are given, M and bias.
         poison: Begin all memory as numbers that are none, so that whatever is read before it is
             written shows.
 
@@ -50,19 +53,29 @@ class FleetProgram:
         fixed: Numbers that robots share.
         whole: Whole numbers that they share, and where the arrays of the tasks are.
         kernel: The kernel of Warp.
+        memory: Bytes of the arrays that each robot has for itself.
     """
 
     def __init__(
-        self, plan: Plan, arrays: list[TaskArrays], dtype: str, device: Any, *, poison: bool = False
+        self,
+        plan: Plan,
+        arrays: list[TaskArrays],
+        dtype: str,
+        device: Any,
+        kind: str,
+        *,
+        given: tuple[Any, Any] | None = None,
+        poison: bool = False,
     ) -> None:
         wp = warp()
         real = getattr(wp, dtype)
-        robot = ROBOT.make(plan.size.by_name())
+        sizes = plan.size.by_name()
+        robot = ROBOT.make({**sizes, "given": sizes["tasks"] if given else 0})
         layout = RobotLayout(plan.tick, {"robot": robot}, poison=poison)
         self._addresses: list[int] = []
         self._first = layout.integers.size
-        lines = _lines(plan, arrays, self._address)
-        code, name = _translated(dtype)
+        lines = _lines(plan, arrays, given, self._address)
+        code, name = _translated(dtype, given is not None)
         text = "\n".join(
             [
                 f"typedef {'double' if dtype == 'float64' else 'float'} real;",
@@ -70,15 +83,15 @@ class FleetProgram:
                 "const real* fixed = fixed_.data; const I* whole = (const I*)whole_.data;",
                 layout.types(),
                 code,
-                layout.memory(),
+                layout.definitions(),
                 *lines[0],
                 f"{name}(work, robot);",
                 *lines[1],
                 "",
             ]
         )
-        kind = "cpu" if device.is_cpu else "cuda"
         self.kernel = fleet_kernel(_for_compiler(text, kind), dtype, OPTIONS[kind])
+        self.memory = layout.memory_of(np.dtype(dtype).itemsize)
         self.fixed = wp.array(layout.numbers, dtype=real, device=device)
         whole = np.concatenate([layout.integers, np.array(self._addresses, np.int64)])
         self.whole = wp.array(whole, dtype=wp.int64, device=device)
@@ -89,40 +102,48 @@ class FleetProgram:
         return f"whole[{self._first + len(self._addresses) - 1}]"
 
 
-def _lines(plan: Plan, arrays: list[TaskArrays], address: Any) -> tuple[list[str], list[str]]:
+def _lines(
+    plan: Plan, arrays: list[TaskArrays], given: tuple[Any, Any] | None, address: Any
+) -> tuple[list[str], list[str]]:
     """Write what a robot reads before its tick and what it tells after it."""
     nq, n = plan.axes.q.size, plan.n
     before = [
-        f"{{ const real* from = {_row('q')}; for (int k = 0; k < {nq}; ++k) work.q_(k) = from[k]; }}",
-        f"{{ const real* from = {_row('v')}; for (int k = 0; k < {n}; ++k) work.v_(k) = from[k]; }}",
+        f"{{ const real* from = {_row('q')}; for (int k = 0; k < {nq}; ++k) work.q_()(k) = from[k]; }}",
+        f"{{ const real* from = {_row('v')}; for (int k = 0; k < {n}; ++k) work.v_()(k) = from[k]; }}",
     ]
-    after = [f"{{ real* to = {_row('tau')}; for (int k = 0; k < {n}; ++k) to[k] = work.tau_(k); }}"]
+    after = [
+        f"{{ real* to = {_row('tau')}; for (int k = 0; k < {n}; ++k) to[k] = work.tau_()(k); }}"
+    ]
     variables, limits = plan.size.variables, plan.size.limits
     start = f"ramps.data + (long long)i * {variables * VARIABLE_SIZE}"
     before.append(
         f"{{ const double now = times.shape[0] > 1 ? times.data[i] : times.data[0]; "
         f"const double* from = {start}; "
-        f"for (int k = 0; k < {variables * VARIABLE_SIZE}; ++k) work.variable_.p[k] = "
+        f"for (int k = 0; k < {variables * VARIABLE_SIZE}; ++k) work.variable_().p[k] = "
         f"real(k % {VARIABLE_SIZE} == {START} ? from[k] - now : from[k]); }}"
     )
     groups = f"groups.data + (long long)i * {variables}"
-    before.append(f"for (int k = 0; k < {variables}; ++k) work.group_.p[k] = ({groups})[k];")
-    after.append(f"for (int k = 0; k < {variables}; ++k) ({groups})[k] = work.group_.p[k];")
-    after.append("status.data[i] = robot.status_(0); solves.data[i] = robot.solves_(0);")
+    before.append(f"for (int k = 0; k < {variables}; ++k) work.group_().p[k] = ({groups})[k];")
+    after.append(f"for (int k = 0; k < {variables}; ++k) ({groups})[k] = work.group_().p[k];")
+    after.append("status.data[i] = robot.status_()(0); solves.data[i] = robot.solves_()(0);")
     after.append(
         f"for (int k = 0; k < {limits}; ++k) limits.data[(long long)i * {limits} + k] = "
-        "work.limit_h_.p[k];"
+        "work.limit_h_().p[k];"
     )
+    told = [
+        (0, "in", x, f"work.{k}_().p") for k, x in zip(("M", "bias"), given or (), strict=False)
+    ]
     for i, (task, packed) in enumerate(zip(arrays, plan.packed, strict=True)):
-        for way, array, inside in task.places(i, packed.rows):
-            kind = "real" if array.dtype is not warp().int64 else "I"
-            size = int(np.prod(array.shape[1:], dtype=int))
-            at = f"(({kind}*){address(array)} + (long long)i * {size})"
-            if "in" in way:
-                before.append(f"for (int k = 0; k < {size}; ++k) {inside}[k] = {at}[k];")
-            if "out" in way:
-                guard = f"if (robot.found_({i})) " if way == "in, out where found" else ""
-                after.append(f"{guard}for (int k = 0; k < {size}; ++k) {at}[k] = {inside}[k];")
+        told += [(i, *place) for place in task.places(i, packed.rows)]
+    for i, way, array, inside in told:
+        kind = "real" if array.dtype is not warp().int64 else "I"
+        size = int(np.prod(array.shape[1:], dtype=int))
+        at = f"(({kind}*){address(array)} + (long long)i * {size})"
+        if "in" in way:
+            before.append(f"for (int k = 0; k < {size}; ++k) {inside}[k] = {at}[k];")
+        if "out" in way:
+            guard = f"if (robot.found_()({i})) " if way == "in, out where found" else ""
+            after.append(f"{guard}for (int k = 0; k < {size}; ++k) {at}[k] = {inside}[k];")
     return before, after
 
 
@@ -139,5 +160,5 @@ def _row(array: str) -> str:
 
 
 @cache
-def _translated(dtype: str) -> tuple[str, str]:
-    return translate(robot_tick, constants_of(dtype))
+def _translated(dtype: str, given: bool) -> tuple[str, str]:
+    return translate(robot_tick, constants_of(dtype), INSTEAD if given else {})

@@ -48,6 +48,11 @@ class TaskArrays:
         activation: A factor of the task's presence in the stack, 0 to 1.
         error: (m,) x_d − x at the last step, m, rad.
         presence: h at the last step, activation included.
+        told_motion: Whether it is told the three that follow: a task of motion in a fleet that is given
+            the dynamics.
+        pose: (7,) position and quaternion wxyz of what the task controls.
+        jacobian: (6, n) of that, linear rows first.
+        drift: (6,) J̇ q̇ of it.
     """
 
     def __init__(self, task: TrackingTask, count: int, dtype: Any, device: Any) -> None:
@@ -56,11 +61,19 @@ class TaskArrays:
         self._count, self._dtype, self._device = count, dtype, device
         self._size = 0
         self._joints = False
+        self.told_motion = False
         self._start = 0
         self._wishes = np.full(count, task.target is None)
 
-    def begin(self, tick: Record, i: int, rows: slice) -> None:
-        """Take what the task is told from the arrays of a plan in which it is the task ``i``."""
+    def begin(self, tick: Record, i: int, rows: slice, *, given: bool) -> None:
+        """Take what the task is told from the arrays of a plan in which it is the task ``i``.
+
+        Args:
+            tick: The arrays.
+            i: Number of the task.
+            rows: Its rows.
+            given: Whether its motion is given.
+        """
         if self._size:
             return
         kind, number = tick.kind[i], tick.numbers[i]
@@ -80,6 +93,11 @@ class TaskArrays:
             self._size = target.size
             velocity = number[GOAL_VELOCITY : GOAL_VELOCITY + size]
             acceleration = number[GOAL_ACCELERATION : GOAL_ACCELERATION + size]
+            if given:
+                self.told_motion = True
+                self.pose = self._filled(np.eye(7)[3])
+                self.jacobian = self._filled(np.zeros((6, tick.v.size)))
+                self.drift = self._filled(np.zeros(6))
         self.target, self.velocity, self.acceleration = map(
             self._filled, (target, velocity, acceleration)
         )
@@ -155,25 +173,28 @@ class TaskArrays:
         for name in ("target", "velocity", "acceleration"):
             width = 7 if name == "target" else 6
             start = self._start if name == "target" else 0
-            place = f"robot.{name}_.p + {i * width + start}"
+            place = f"robot.{name}_().p + {i * width + start}"
             if self._joints:
-                place = f"robot.joint_{name}_.p + {first}"
+                place = f"robot.joint_{name}_().p + {first}"
             way = "in, out where found" if name == "target" else "in"
             yield way, getattr(self, name), f"({place})"
-        yield "in", self.kp, f"(work.kp_.p + {first})"
-        yield "in", self.kv, f"(work.kv_.p + {first})"
-        yield "in", self.activation, f"(work.own_.p + {i})"
-        yield "out", self.presence, f"(work.h_.p + {i})"
-        yield "out", self.error, f"(work.error_.p + {first})"
-        yield "in", self._epoch, f"(robot.epoch_.p + {i})"
-        yield "in", self._holds, f"(robot.holds_.p + {i})"
-        yield "in, out", self._seen, f"(robot.seen_.p + {i})"
-        yield "in, out", self._remembers, f"(robot.remembers_.p + {i})"
-        yield "in, out", self._turn, f"(robot.turn_.p + {4 * i})"
+        for name in ("pose", "jacobian", "drift") if self.told_motion else ():
+            array = getattr(self, name)
+            yield "in", array, f"(robot.{name}_().p + {i * int(np.prod(array.shape[1:]))})"
+        yield "in", self.kp, f"(work.kp_().p + {first})"
+        yield "in", self.kv, f"(work.kv_().p + {first})"
+        yield "in", self.activation, f"(work.own_().p + {i})"
+        yield "out", self.presence, f"(work.h_().p + {i})"
+        yield "out", self.error, f"(work.error_().p + {first})"
+        yield "in", self._epoch, f"(robot.epoch_().p + {i})"
+        yield "in", self._holds, f"(robot.holds_().p + {i})"
+        yield "in, out", self._seen, f"(robot.seen_().p + {i})"
+        yield "in, out", self._remembers, f"(robot.remembers_().p + {i})"
+        yield "in, out", self._turn, f"(robot.turn_().p + {4 * i})"
         if self._joints:
-            yield "in, out", self._joint_before, f"(robot.joint_before_.p + {first})"
+            yield "in, out", self._joint_before, f"(robot.joint_before_().p + {first})"
         else:
-            yield "in, out", self._before, f"(robot.before_.p + {4 * i})"
+            yield "in, out", self._before, f"(robot.before_().p + {4 * i})"
 
     def _filled(self, row: ArrayLike) -> Any:
         """Make an array with the same row for every robot."""
