@@ -59,7 +59,7 @@ def motions_left(stacks: Stacks, first: int, n: int, *, weighed: bool) -> Float[
 
         P_l = Σ_T w_T (I + κ Σ_{k in T, l(k) <= l} Ĵ_kᵀ Ĵ_k + Σ_{k in T, l(k) > l} ω_k Ĵ_kᵀ Ĵ_k)⁻¹
 
-    Of each stack T the rows of the levels up to l count κ = 10⁶ times. Without weights ω = 0; with
+    Of each stack T the rows of the levels up to l count κ = 10⁵ times. Without weights ω = 0; with
     them ω is that of `task_metric` in T: of the motions that are left, those that levels below see
     count more the higher they are.
 

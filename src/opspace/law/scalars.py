@@ -616,7 +616,7 @@ def level_weight(below: float) -> float:
 
 LEFT = 0.5
 """Part of what a limit allows its joint that levels may use which are not the first."""
-UNSEEN = 1e6
+UNSEEN = 1e5
 """How much more an acceleration counts that levels above see than one that they do not: these may give
 way to a limit before the others by so much."""
 ROOM_SOFT = 7e-3
@@ -629,7 +629,7 @@ the part s keeps (ROOM_SOFT / (s + ROOM_SOFT))⁸ of its excess."""
 SOFT = 1e-7
 """How soft bounds on accelerations are; where they contradict each other or the motors, the excess is
 shared."""
-SOFT_APART = 1.5e-2
+SOFT_APART = 3e-3
 """How soft bounds on distances are: where rows of neighbouring balls are nearly one, the answer goes
 from one to the other over as much of their difference. What it leaves of an excess is cleaned away like
 that of the others; a distance that contradicts a joint limit or a motor gives way."""
