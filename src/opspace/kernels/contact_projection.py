@@ -18,7 +18,7 @@ from opspace.kernels.algebra import (
     singular_values,
     solve_lower,
 )
-from opspace.kernels.compiled_scalars import entering_weight
+from opspace.kernels.compiled_scalars import entering_weight, hardened
 from opspace.kernels.contact_rows import close_contacts
 from opspace.kernels.distances import faster, row_softness
 from opspace.kernels.inertia import acceleration_of, torque_of
@@ -33,6 +33,7 @@ from opspace.kernels.stance_columns import (
 from opspace.law.scalars import (
     BROKEN,
     CLEANINGS,
+    HANDOVERS,
     HARD,
     LEAST_REGULAR,
     MOTOR_SOFT,
@@ -71,7 +72,7 @@ def nearest_with_forces(work, stacks, closings):
         work.distances.held[i] = 0
     for a in range(n):
         stance.trial[a] = work.joint_acceleration[a]
-    count = _take_in(work, free, size, rank, count)
+    count = _take_in(work, 0, free, size, rank, count)
     held, known = begin_again(count, size - rank, stance), 0
     # Several times, what softness leaves of an excess included.
     for turn in range(CLEANINGS):
@@ -80,10 +81,14 @@ def nearest_with_forces(work, stacks, closings):
             known, before = held, count
             _point(stance, size, rank)
             _try(work, free)
-            count = _take_in(work, free, size, rank, count)
+            count = _take_in(work, turn, free, size, rank, count)
             if count == before:
                 break
         go_on_from(turn, size - rank, held, stance)
+        if turn == HANDOVERS - 1:
+            known = 0
+            for i in range(count):
+                stance.bounds.softness[i] = hardened(stance.bounds.softness[i])
     _go(work, free)
 
 
@@ -255,7 +260,7 @@ def _bounds(work, free, size, rank):
 
 
 @jit
-def _take_in(work, free, size, rank, count):
+def _take_in(work, turn, free, size, rank, count):
     """Append the distances that shrink faster at ``trial`` than they may; ``row`` is then overwritten.
 
     Returns:
@@ -279,6 +284,8 @@ def _take_in(work, free, size, rank, count):
         softness = row_softness(work.inertia, d, i)
         if softness == math.inf:
             continue
+        if turn >= HANDOVERS:
+            softness = hardened(softness)
         stance.bounds.multiplier[count] = 0.0
         count = _two_sided(stance, count, first + i, 0, -math.inf, room, softness, size, rank)
     return count

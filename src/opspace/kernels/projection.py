@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 
 from opspace.kernels.algebra import cholesky, cholesky_row, solve_lower, solve_lower_transposed
-from opspace.kernels.compiled_scalars import level_weight
+from opspace.kernels.compiled_scalars import hardened, level_weight
 from opspace.kernels.distances import faster, row_softness
 from opspace.kernels.inertia import acceleration_of, unit_row, whiten, whitened_of
 from opspace.kernels.walk import slot_bit
-from opspace.law.scalars import BROKEN, CLEANINGS, HARD, ROUNDING, SOFT, UNBOUNDED
+from opspace.law.scalars import BROKEN, CLEANINGS, HANDOVERS, HARD, ROUNDING, SOFT, UNBOUNDED
 from opspace.machine.jit import jit
 
 
@@ -67,13 +67,13 @@ def nearest_acceleration(inertia, acceleration, bounds, distances):
             bounds.z[a] += bounds.C[b, a] * bounds.row[b]
     for i in range(distances.held.shape[0]):
         distances.held[i] = 0
-    count = _take_in(inertia, acceleration, count, n, bounds, distances)
+    count = _take_in(0, inertia, acceleration, count, n, bounds, distances)
     for a in range(n):
         bounds.x[a] = bounds.z[a]
     for a in range(bounds.taken.shape[0]):
         bounds.taken[a] = 0.0
     # Several times, what softness leaves of an excess included.
-    for _ in range(CLEANINGS):
+    for turn in range(CLEANINGS):
         while True:
             project_on_bounds(count, n, bounds)
             for a in range(n):
@@ -81,17 +81,19 @@ def nearest_acceleration(inertia, acceleration, bounds, distances):
             solve_lower_transposed(bounds.C, n, acceleration)
             acceleration_of(inertia, acceleration)
             before = count
-            count = _take_in(inertia, acceleration, count, n, bounds, distances)
+            count = _take_in(turn, inertia, acceleration, count, n, bounds, distances)
             if count == before:
                 break
         for a in range(n):
             bounds.x[a] = bounds.y[a]
         for i in range(count):
             bounds.taken[bounds.owner[i]] += bounds.multiplier[i] * bounds.size[i]
+            if turn == HANDOVERS - 1:
+                bounds.softness[i] = hardened(bounds.softness[i])
 
 
 @jit
-def _take_in(inertia, acceleration, count, n, bounds, distances):
+def _take_in(turn, inertia, acceleration, count, n, bounds, distances):
     """Append the distances that shrink faster than they may, as unit normals.
 
     Returns:
@@ -109,6 +111,8 @@ def _take_in(inertia, acceleration, count, n, bounds, distances):
         softness = row_softness(inertia, distances, i)
         if softness == math.inf:
             continue
+        if turn >= HANDOVERS:
+            softness = hardened(softness)
         # The second side is free.
         count = _two_sided(count, n, 4 * n + i, -math.inf, most, softness, bounds)
     return count

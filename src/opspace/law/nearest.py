@@ -13,11 +13,13 @@ from jaxtyping import Bool, Float
 from opspace.law.hierarchy import Level, WhitenedTask
 from opspace.law.scalars import (
     CLEANINGS,
+    HANDOVERS,
     HARD,
     ROUNDING,
     SOFT,
     SOFT_APART,
     UNBOUNDED,
+    hardened,
     level_weight,
     yielding,
 )
@@ -159,8 +161,11 @@ def nearest_within(
     there = (bounds < UNBOUNDED) & (size > 0.0) & (softness < np.inf)
     taken = np.zeros(bounds.size)
     unit = rows[there] / size[there, None]
-    for _ in range(CLEANINGS):
-        x, multipliers = nearest_point(x, unit, bounds[there] / size[there], softness[there])
+    soft = softness[there]
+    for turn in range(CLEANINGS):
+        if turn == HANDOVERS:
+            soft = np.array([hardened(one) for one in soft.tolist()])
+        x, multipliers = nearest_point(x, unit, bounds[there] / size[there], soft)
         taken[there] += multipliers * size[there]
     return x, taken
 

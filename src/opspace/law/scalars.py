@@ -629,13 +629,23 @@ the part s keeps (ROOM_SOFT / (s + ROOM_SOFT))⁸ of its excess."""
 SOFT = 1e-7
 """How soft bounds on accelerations are; where they contradict each other or the motors, the excess is
 shared."""
-SOFT_APART = 3e-3
-"""How soft bounds on distances are: where rows of neighbouring balls are nearly one, the answer goes
-from one to the other over as much of their difference. What it leaves of an excess is cleaned away like
-that of the others; a distance that contradicts a joint limit or a motor gives way."""
+SOFT_APART = 1.5e-2
+"""How soft bounds on distances are in the first projections: where rows of neighbouring balls are nearly
+one, the answer goes from one to the other over as much of their difference. What is left of an excess is
+small then, and projected away with bounds as hard as the others, so that a distance gives way to a joint
+limit no more than that one to it."""
+HANDOVERS = 2
+"""How many projections are as soft."""
 CLEANINGS = 3
 """How often the projection is made: each one starts from the answer of the one before, and what that
 left of an excess because its bounds are soft becomes smaller by their softness."""
+
+
+def hardened(softness: float) -> float:
+    """Softness of a bound after `HANDOVERS` projections; only distances are as soft as `SOFT_APART`."""
+    return softness - SOFT_APART + SOFT if softness >= SOFT_APART else softness
+
+
 HARD = 1e-12
 """How soft bounds on torques are: softer than rounding, harder than those on accelerations."""
 ROUNDING = 1e-13
