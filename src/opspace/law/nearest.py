@@ -138,6 +138,34 @@ def _hold(
     return False
 
 
+def cleaned(
+    x: Float[np.ndarray, " n"],
+    rows: Float[np.ndarray, "k n"],
+    bounds: Float[np.ndarray, " k"],
+    softness: Float[np.ndarray, " k"],
+    turns: int,
+) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, " k"]]:
+    """Find `nearest_point` several times, each time from the last one.
+
+    Args:
+        x: (n,).
+        rows: (k, n) of unit length or less.
+        bounds: (k,) finite.
+        softness: (k,) above 0; that of distances is `hardened` on the way.
+        turns: How many times.
+
+    Returns:
+        The point, (n,), and the sum of the multipliers, (k,).
+    """
+    total = np.zeros(bounds.size)
+    for turn in range(turns):
+        if turn == HANDOVERS and np.any(softness >= SOFT_APART):
+            softness = np.array([hardened(one) for one in softness.tolist()])
+        x, multipliers = nearest_point(x, rows, bounds, softness)
+        total += multipliers
+    return x, total
+
+
 def nearest_within(
     x: Float[np.ndarray, " n"],
     rows: Float[np.ndarray, "k n"],
@@ -160,13 +188,9 @@ def nearest_within(
     size = np.linalg.norm(rows, axis=1)
     there = (bounds < UNBOUNDED) & (size > 0.0) & (softness < np.inf)
     taken = np.zeros(bounds.size)
-    unit = rows[there] / size[there, None]
-    soft = softness[there]
-    for turn in range(CLEANINGS):
-        if turn == HANDOVERS:
-            soft = np.array([hardened(one) for one in soft.tolist()])
-        x, multipliers = nearest_point(x, unit, bounds[there] / size[there], soft)
-        taken[there] += multipliers * size[there]
+    unit, limits = rows[there] / size[there, None], bounds[there] / size[there]
+    x, multipliers = cleaned(x, unit, limits, softness[there], CLEANINGS)
+    taken[there] = multipliers * size[there]
     return x, taken
 
 
