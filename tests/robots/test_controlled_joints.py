@@ -10,7 +10,14 @@ import numpy as np
 import pytest
 
 import opspace as osc
-from opspace import ModelError, ModelWarning, ScenarioError, UnknownNameError, load_robot
+from opspace import (
+    InputError,
+    ModelError,
+    ModelWarning,
+    ScenarioError,
+    UnknownNameError,
+    load_robot,
+)
 from opspace.robots import Robot
 from opspace.robots.adapter import spread_of
 from opspace.runs.check import check_robot
@@ -173,6 +180,10 @@ def test_a_held_joint_of_a_urdf_is_the_free_one_at_that_place(
         q[full.joint_names.index(name)] = value
     full.update(q, v)
     robot.update(q[kept], v[kept])
+    with pytest.raises(
+        InputError, match=rf"without coordinates: .*{next(iter(locked))}.* \(held\)"
+    ):
+        robot.check_state(q, v)
     np.testing.assert_allclose(robot.M, full.M[np.ix_(kept, kept)], atol=1e-12)
     np.testing.assert_allclose(robot.bias, full.bias[kept], atol=1e-11)
     for name in robot.frame_names:
@@ -244,6 +255,8 @@ def test_joints_that_follow_move_with_their_leader(tmp_path: Path, what: str) ->
     q, v = one.q_reference + 0.1 * rng.standard_normal(one.nv), rng.standard_normal(one.nv)
     for robot in (one, other):
         robot.update(q, v)
+        with pytest.raises(InputError, match=r"without coordinates: .*(following others|held)\)"):
+            robot.check_state(spread.offset, spread.offset)
     np.testing.assert_allclose(one.M, other.M, atol=1e-12)
     np.testing.assert_allclose(one.bias, other.bias, atol=1e-11)
     step = 1e-6

@@ -540,6 +540,13 @@ class AdapterBase(ABC):
             )
         return int(frame)
 
+    def _without_coordinates(self) -> str:
+        """Name the joints of the file that have none."""
+        following = [one.follower for one in self.description.couplings]
+        reasons = {"held": list(self.description.locked), "following others": following}
+        told = [f"{', '.join(names)} ({why})" for why, names in reasons.items() if names]
+        return f"; without coordinates: {', '.join(told)}" if told else ""
+
     def check_state(self, q: np.ndarray, v: np.ndarray) -> None:
         """Check a state.
 
@@ -552,7 +559,10 @@ class AdapterBase(ABC):
         """
         for name, value, size in (("q", q, self.nq), ("v", v, self.nv)):
             if value.shape != (size,):
-                raise InputError(f"{name} of {self.name} has shape {value.shape}, not ({size},)")
+                raise InputError(
+                    f"{name} of {self.name} has shape {value.shape}, not ({size},)"
+                    + self._without_coordinates()
+                )
         if not (np.isfinite(q).all() and np.isfinite(v).all()):
             self._refuse_non_finite(q, v)
         for i in self.description.quaternions:
