@@ -111,4 +111,6 @@ def main(numbers: list[str]) -> None:
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:])
+    asked = sys.argv[1:]
+    del sys.argv[1:]  # examples read these words, too
+    main(asked)

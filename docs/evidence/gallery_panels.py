@@ -197,15 +197,31 @@ def torque_limits(run):
     ]
 
 
-def many_robots(run):
-    """Show how far the hands are from their targets, all of them."""
-    found = 1e3 * np.array(run.names["distances"])
-    t = 20e-3 * np.arange(len(found))
-    return [
-        Panel(
-            "eight arms, the slower half begins anew",
-            "distance of the hand [mm]",
-            [(f"arm {i}", t, found[:, i]) for i in range(found.shape[1])],
-            TIME,
-        )
+def environment(run):
+    """Show how the rewards of both policies add up."""
+    t = 20e-3 * np.arange(1, 51)
+    lines = [(name, t, np.cumsum(found)) for name, found in run.names["rewards"].items()]
+    return [Panel("32 arms reach for points", "reward so far, of an arm", lines)]
+
+
+def writing(run, columns=21):
+    """Show what the arms have written, one beside the other and in rows."""
+    n = run.names
+    traces, arms, swapping, beginning = n["traces"], n["arms"], n["swapping"], n["beginning"]
+    across, down = 0.16 * (arms % columns), 0.25 * (arms // columns)
+    gap = np.full((1, arms.size), np.nan)  # the pen goes up between two letters
+    x = np.vstack([traces[:, :, 1] + across, gap]).T
+    y = np.vstack([traces[:, :, 2] - down, gap]).T
+    groups = {
+        "ranks kept": ~swapping & ~beginning,
+        "ranks swapped": swapping,
+        "begun anew": beginning,
+    }
+    # A point alone is not drawn: here it is where the name of its line goes.
+    side, heights = np.nanmax(x), np.linspace(np.nanmax(y), np.nanmin(y), 5)[1:4]
+    lines = [
+        (name, np.append(x[group], side), np.append(y[group], height))
+        for (name, group), height in zip(groups.items(), heights, strict=True)
     ]
+    side, height = "side, letters 0.16 m apart [m]", "height, rows 0.25 m apart [m]"
+    return [Panel(f"{arms.size} arms write", height, lines, side, equal=True)]

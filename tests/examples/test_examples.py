@@ -8,7 +8,7 @@ from tests.another_python import python
 
 EXAMPLES = sorted((Path(__file__).parents[2] / "examples").glob("*.py"))
 
-EXTRAS = {"13_many_robots": ("gpu", "warp")}
+EXTRAS = {"13_environment": ("gpu", "warp"), "14_writing": ("gpu", "warp")}
 """Examples that need an extra, and the package that it brings."""
 
 
