@@ -219,11 +219,7 @@ def test_a_tick_that_cannot_be_trusted_holds_the_last_torque(g1):
 def test_what_makes_no_sense_is_refused(g1):
     with pytest.raises(InputError, match="bolted down"):
         osc.Controller(osc.load_robot("ur5"), osc.Stack([], contacts=[osc.PointContact("tool0")]))
-    for option in (
-        {"bias": "task"},
-        {"gravity": "robot"},
-        {"collisions": osc.CollisionAvoidance()},
-    ):
+    for option in ({"bias": "task"}, {"gravity": "robot"}):
         with pytest.raises(InputError, match="floating base"):
             controller_of(g1, **option)
     with pytest.raises(osc.UnknownNameError, match="sole"):

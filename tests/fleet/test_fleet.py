@@ -126,8 +126,8 @@ def test_single_precision():
         # Where bounds contradict each other their softness decides, which digits limit.
         kept = double.fleet.status.numpy() & int(osc.Status.LIMIT_LOST) == 0
         error = np.abs(tau - want).max(axis=1)[kept] / np.abs(want).max(axis=1)[kept]
-        assert np.quantile(error, 0.99) < 1e-5
-        assert error.max() < 1e-3
+        assert np.quantile(error, 0.99) < 1e-4
+        assert error.max() < 1e-2
         double.fleet.reset()
         single.fleet.reset()
 

@@ -42,7 +42,8 @@ def test_a_ur10_beyond_its_reach_rests_there(recording):
 def test_a_ur10_beyond_its_reach_comes_back(recording):
     run = recording("ur10-stretch")
     assert error(run, "position")[-1] < 1e-3
-    assert np.max(error(run, "orientation")) < 1e-6
+    # At a limit a level sees 1e-5 of what those below give way.
+    assert np.max(error(run, "orientation")) < 1e-5
     assert np.max(np.abs(run.group("v")[-1])) < 1e-3
     assert torque_step(run) < 0.7
 

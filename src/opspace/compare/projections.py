@@ -66,7 +66,12 @@ class Wanted(NamedTuple):
     drift: np.ndarray
 
     def nearest(
-        self, W: np.ndarray, lower: np.ndarray, upper: np.ndarray, most: np.ndarray
+        self,
+        W: np.ndarray,
+        lower: np.ndarray,
+        upper: np.ndarray,
+        most: np.ndarray,
+        softness: np.ndarray | None = None,
     ) -> np.ndarray:
         """Project what is wanted on bounds of joints, motors and distances in a metric."""
         return nearest_acceleration(
@@ -79,6 +84,7 @@ class Wanted(NamedTuple):
             self.room - self.balance,
             self.G,
             most,
+            softness,
         ).acceleration
 
 

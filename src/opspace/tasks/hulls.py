@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.spatial import ConvexHull, QhullError
 
 from opspace.errors import InputError
 
@@ -21,6 +20,8 @@ def hull_faces(points: np.ndarray, what: str) -> np.ndarray:
     Raises:
         InputError: Not (k, 3), not finite, or points without a volume.
     """
+    from scipy.spatial import ConvexHull, QhullError  # noqa: PLC0415 - slow to import
+
     if points.ndim != 2 or points.shape[1:] != (3,) or not np.all(np.isfinite(points)):
         raise InputError(f"{what} must be finite numbers (k, 3), not of shape {points.shape}")
     try:
