@@ -67,7 +67,7 @@ class LimitWatch:
             self.numbers["distance_excess"] = np.nan
 
     def observe(self, q: np.ndarray, v: np.ndarray, command: Command) -> None:
-        """See one tick; the plant's state counts, not the measured one."""
+        """See one tick; the plant's state counts, not the measured one, except for distances."""
         del q, v
         tau, numbers = command.tau, self.numbers
         v = self._plant.v

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cache
 from typing import Any
 
 import numpy as np
 
 from opspace.controller.collisions import distance_terms
-from opspace.robots import Robot, load_robot
+from opspace.robots import Robot
+from opspace.robots.shapes import LinkCapsule
 from opspace.scenario.obstacle_entries import ObstacleEntry
 from opspace.tasks import CollisionAvoidance
 
@@ -59,44 +61,56 @@ def random_collisions(
 
     Args:
         rng: Where every number comes from.
-        robot: The arm, by its name in the catalogue; its state changes.
+        robot: The arm; its state changes.
         start: (n,) the posture in which it starts, rad or m.
         span: (n,) and (n,) between which joints are, rad or m.
 
     Returns:
         ``collisions`` of a scenario.
     """
-    own, still = _own(robot.name), np.zeros(robot.nv)
+    own, still = _own(robot), np.zeros(robot.nv)
     robot.update(start, still)
     apart = _nearest(CollisionAvoidance(shapes=own.shapes, pairs=own.pairs), robot)
-    wanted, obstacles = int(rng.integers(2, 7)), {}
+    wanted = int(rng.integers(2, 7))
+    obstacles: dict[str, dict[str, Any]] = {}
     for _ in range(TRIES):
         if len(obstacles) == wanted:
             break
-        robot.update(rng.uniform(*span), still)
-        link = own.shapes[int(rng.integers(len(own.shapes)))]
-        frame = robot.frame_id(link.frame)
-        inside = robot.rotation(frame) @ rng.choice([link.start, link.end])
-        entry = random_obstacle(rng, robot.position(frame) + inside)
-        speed = 0.0
-        if rng.random() < MOVING:
-            speed = float(rng.uniform(0.1 * SPEED, SPEED))
-            way = rng.normal(size=3)
-            entry["velocity"] = (speed * way / np.linalg.norm(way)).tolist()
+        entry = _in_the_way(rng, robot, own.shapes, span)
         robot.update(start, still)
         drawn = ObstacleEntry(**entry).build("drawn")
         gap = _nearest(CollisionAvoidance(drawn, shapes=own.shapes, pairs="none"), robot)
+        speed = float(np.linalg.norm(entry.get("velocity", 0.0)))
         if gap > MARGIN + CLEAR + REACT * speed:
             obstacles[f"{entry['shape']}{len(obstacles) + 1}"] = entry
     pairs = "auto" if apart > MARGIN + CLEAR else "none"
     return {"margin": MARGIN, "pairs": pairs, "obstacles": obstacles}
 
 
+def _in_the_way(
+    rng: np.random.Generator,
+    robot: Robot,
+    shapes: Sequence[LinkCapsule],
+    span: tuple[np.ndarray, np.ndarray],
+) -> dict[str, Any]:
+    """Draw an obstacle in a link of any posture, which the robot is then in."""
+    robot.update(rng.uniform(*span), np.zeros(robot.nv))
+    link = shapes[int(rng.integers(len(shapes)))]
+    frame = robot.frame_id(link.frame)
+    inside = robot.rotation(frame) @ rng.choice([link.start, link.end])
+    entry = random_obstacle(rng, robot.position(frame) + inside)
+    if rng.random() < MOVING:
+        way = rng.normal(size=3)
+        speed = rng.uniform(0.1 * SPEED, SPEED)
+        entry["velocity"] = (speed * way / np.linalg.norm(way)).tolist()
+    return entry
+
+
 @cache
-def _own(name: str) -> CollisionAvoidance:
-    """Shapes and pairs of an arm, found once in a process."""
+def _own(robot: Robot) -> CollisionAvoidance:
+    """Find shapes and pairs of an arm, once in a process."""
     guard = CollisionAvoidance(margin=MARGIN)
-    guard.bind(load_robot(name))
+    guard.bind(robot)
     return guard
 
 
