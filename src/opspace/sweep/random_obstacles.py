@@ -57,7 +57,7 @@ def random_collisions(
     """Draw 2 to 6 obstacles where an arm may come, some of them moving.
 
     Each has its middle in a link of another posture, and is so far from all links that the arm can
-    still keep the margin. Links are kept from each other unless they are too near already.
+    still keep the margin. Links that are too near each other already are not kept apart.
 
     Args:
         rng: Where every number comes from.
@@ -70,7 +70,7 @@ def random_collisions(
     """
     own, still = _own(robot), np.zeros(robot.nv)
     robot.update(start, still)
-    apart = _nearest(CollisionAvoidance(shapes=own.shapes, pairs=own.pairs), robot)
+    apart = _gaps(CollisionAvoidance(shapes=own.shapes, pairs=own.pairs), robot)
     wanted = int(rng.integers(2, 7))
     obstacles: dict[str, dict[str, Any]] = {}
     for _ in range(TRIES):
@@ -79,11 +79,11 @@ def random_collisions(
         entry = _in_the_way(rng, robot, own.shapes, span)
         robot.update(start, still)
         drawn = ObstacleEntry(**entry).build("drawn")
-        gap = _nearest(CollisionAvoidance(drawn, shapes=own.shapes, pairs="none"), robot)
+        gaps = _gaps(CollisionAvoidance(drawn, shapes=own.shapes, pairs="none"), robot)
         speed = float(np.linalg.norm(entry.get("velocity", 0.0)))
-        if gap > MARGIN + CLEAR + REACT * speed:
+        if min(gaps.values()) > MARGIN + CLEAR + REACT * speed:
             obstacles[f"{entry['shape']}{len(obstacles) + 1}"] = entry
-    pairs = "auto" if apart > MARGIN + CLEAR else "none"
+    pairs = [[one, two] for one, two in own.pairs if apart[f"{one}/{two}"] > MARGIN + CLEAR]
     return {"margin": MARGIN, "pairs": pairs, "obstacles": obstacles}
 
 
@@ -114,8 +114,9 @@ def _own(robot: Robot) -> CollisionAvoidance:
     return guard
 
 
-def _nearest(guard: CollisionAvoidance, robot: Robot) -> float:
-    """Least distance at the present state of the robot, m."""
+def _gaps(guard: CollisionAvoidance, robot: Robot) -> dict[str, float]:
+    """Distances at the present state of the robot by pair, m."""
     guard.bind(robot)
     terms = distance_terms(guard, robot, 0.0, np.full(robot.nv, np.inf))
-    return float(np.min(terms.distance, initial=np.inf))
+    told = terms.layout.status(terms.distance, np.zeros(terms.distance.size))
+    return {pair: apart.distance for pair, apart in told.items()}
