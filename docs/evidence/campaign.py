@@ -23,6 +23,7 @@ WORDS = {
     "position_excess": "beyond a limit that could be respected",
     "position_outside": "beyond a limit, for whatever reason",
     "speed_excess": "faster than a limit that could be respected",
+    "distance_excess": "nearer than the margin before it was said",
     "max_joint_speed": "joint speed",
     "max_torque_use": "torque as a part of its limit",
     "max_torque_step": "torque step within 1 ms",
@@ -51,15 +52,37 @@ def summary(plan, rows):
     robots = Counter(row["scenario"]["robot"] for row in rows if row["scenario"])
     return (
         f"Seed {plan['seed']}, {len(rows):,} of {plan['runs']:,} runs, {seconds:,.0f} s of motion at "
-        f"1 kHz on {len(robots)} arms: {ended}.\n"
+        f"1 kHz on {len(robots)} arms: {ended}.\n{among_obstacles(rows)}"
     )
 
 
+def among_obstacles(rows):
+    """Say how often distances were lost, where nothing moved and where something did; empty without."""
+    words = []
+    for what, moves in (("still obstacles", False), ("moving ones", True)):
+        chosen = [row for row in rows if moving(row) is moves]
+        lost = sum("COLLISION_LOST" in row["seconds"] for row in chosen)
+        if chosen:
+            words.append(f"{lost:,} of {len(chosen):,} runs with {what}")
+    return f"`COLLISION_LOST` came in {' and in '.join(words)}.\n" if words else ""
+
+
+def moving(row):
+    """Whether an obstacle of a run moves; None where there are none."""
+    collisions = (row["scenario"] or {}).get("collisions")
+    if not collisions:
+        return None
+    return any(any(entry["velocity"]) for entry in collisions["obstacles"].values())
+
+
 def numbers_table(rows):
-    """Write every number's distribution, and in how many runs it is not zero."""
+    """Write every number's distribution over the runs that have it, and in how many it is not zero."""
     lines = []
     for name, words in WORDS.items():
-        values = np.array([row["numbers"][name] for row in rows if row["numbers"]], dtype=float)
+        values = np.array([row["numbers"].get(name) for row in rows], dtype=float)
+        values = values[np.isfinite(values)]
+        if not values.size:
+            continue
         unit = "" if UNITS[name] == "1" else f" [{UNITS[name]}]"
         shown = [np.median(values), np.percentile(values, 99), values.max()]
         count = f"{np.count_nonzero(values):,}"

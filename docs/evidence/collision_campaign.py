@@ -18,6 +18,8 @@ from typing import NamedTuple
 import numpy as np
 
 import opspace as osc
+from opspace.scenario.obstacle_entries import ObstacleEntry
+from opspace.sweep.random_obstacles import random_obstacle
 
 ARMS = ("panda", "ur5", "xarm7", "puma560")
 TWO = "two-ur5"
@@ -55,16 +57,7 @@ def random_obstacles(rng):
     """Balls, boxes and capsules anywhere around a base."""
     for i in range(rng.integers(2, 7)):
         place = rng.uniform((-0.8, -0.8, 0.1), (0.8, 0.8, 1.0))
-        turn = rng.normal(size=4)
-        turn /= np.linalg.norm(turn)
-        kind = rng.integers(3)
-        if kind == 0:
-            yield osc.Ball(rng.uniform(0.03, 0.12), place, name=str(i))
-        elif kind == 1:
-            yield osc.Box(rng.uniform(0.05, 0.3, 3), place, turn, name=str(i))
-        else:
-            size = rng.uniform((0.02, 0.1), (0.08, 0.4))
-            yield osc.Capsule(*size, place, turn, name=str(i))
+        yield ObstacleEntry(**random_obstacle(rng, place)).build(str(i))
 
 
 def arm(name, rng, obstacles):

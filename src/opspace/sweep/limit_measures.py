@@ -16,6 +16,7 @@ UNITS = {
     "position_excess": "rad",
     "position_outside": "rad",
     "speed_excess": "rad/s",
+    "distance_excess": "m",
     "not_finite": "ticks",
     "above_torque_limit": "ticks",
     "max_hard_solves": "1",
@@ -32,7 +33,10 @@ class LimitWatch:
     had once been able to stop at, v <= v_adm(d) (`opspace.JointLimits`), and since then neither a
     push has driven it nor has a tick said ``LIMIT_LOST``. ``speed_excess`` likewise, for joints that
     were slow enough once. ``position_outside`` asks for no reason: it is how far any joint went beyond a
-    limit that it had once been inside of.
+    limit that it had once been inside of. ``distance_excess`` is how much nearer than the margin a pair
+    of bodies came, as measured, that is kept apart (`opspace.CollisionAvoidance`) and had once been
+    outside of it, before the first push and the first tick that said ``COLLISION_LOST``; NaN where
+    nothing is kept apart.
 
     Args:
         built: The run.
@@ -49,6 +53,9 @@ class LimitWatch:
         self._stops = np.zeros(len(self._sides), dtype=bool)
         self._slow = np.zeros(len(self._sides), dtype=bool)
         self._inside = np.zeros(len(self._sides), dtype=bool)
+        self._guard = built.controller.collisions
+        self._within: set[str] | None = None
+        self._kept = True
         self._plant = built.plant
         self._pushes = built.scenario.plant.pushes
         self._motors = motor_range(built.robot)
@@ -56,9 +63,11 @@ class LimitWatch:
         self._last: np.ndarray | None = None
         self._ticks = dict.fromkeys((status for status in Status if status), 0)
         self.numbers: dict[str, float] = dict.fromkeys(UNITS, 0.0)
+        if self._guard is None:
+            self.numbers["distance_excess"] = np.nan
 
     def observe(self, q: np.ndarray, v: np.ndarray, command: Command) -> None:
-        """See one tick; the plant's state counts, not the measured one."""
+        """See one tick; the plant's state counts, not the measured one, except for distances."""
         del q, v
         tau, numbers = command.tau, self.numbers
         v = self._plant.v
@@ -73,7 +82,9 @@ class LimitWatch:
         numbers["above_torque_limit"] += bool(np.any(used > 1.0))
         for status in self._ticks:
             self._ticks[status] += status in command.status
-        self._watch_limits(command, self._plant.q, v)
+        pushed = self._pushed(command.t)
+        self._watch_limits(command, self._plant.q, v, pushed)
+        self._watch_distances(command, pushed)
 
     @property
     def seconds(self) -> dict[str, float]:
@@ -83,8 +94,25 @@ class LimitWatch:
     def _most(self, name: str, value: float) -> None:
         self.numbers[name] = max(self.numbers[name], value)
 
-    def _watch_limits(self, command: Command, q: np.ndarray, v: np.ndarray) -> None:
-        limits, t = self._limits, command.t
+    def _pushed(self, t: float) -> bool:
+        return any(p.at <= t <= p.at + p.duration + self._dt for p in self._pushes)
+
+    def _watch_distances(self, command: Command, pushed: bool) -> None:
+        guard = self._guard
+        if guard is None:
+            return
+        self._kept &= not pushed and Status.COLLISION_LOST not in command.status
+        if not self._kept:
+            return
+        beyond = {pair: guard.margin - d.distance for pair, d in command.distances.items()}
+        beyond = {pair: value for pair, value in beyond.items() if value > 0.0}
+        # Those that have been within the margin from the start on are not the controller's fault.
+        self._within = beyond.keys() & (beyond.keys() if self._within is None else self._within)
+        for pair in beyond.keys() - self._within:
+            self._most("distance_excess", beyond[pair])
+
+    def _watch_limits(self, command: Command, q: np.ndarray, v: np.ndarray, pushed: bool) -> None:
+        limits = self._limits
         if limits is None:
             return
         distance = self._sign * (self._limit - q[self._index])
@@ -92,7 +120,6 @@ class LimitWatch:
         beyond = np.maximum(-distance - limits.clearance - _ROUNDING, 0.0)
         self._inside |= beyond == 0.0
         self._most("position_outside", float(np.max(beyond, where=self._inside, initial=0.0)))
-        pushed = any(p.at <= t <= p.at + p.duration + self._dt for p in self._pushes)
         if pushed or Status.LIMIT_LOST in command.status:
             self._stops[:] = self._slow[:] = False
             return

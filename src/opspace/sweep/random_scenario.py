@@ -9,6 +9,7 @@ import numpy as np
 
 from opspace.robots import Robot, load_robot
 from opspace.robots.registry import available_robots
+from opspace.sweep.random_obstacles import random_collisions
 
 ARM = "arm"
 DT = 0.001
@@ -20,6 +21,8 @@ OBSERVER_TIME = 0.002
 """How fast joint limits learn what the model does not explain, s."""
 OUTSIDE = 0.15
 """How far outside its limits a joint may start, rad or m."""
+AMONG_OBSTACLES = 1.0 / 3.0
+"""Part of the scenarios that have obstacles."""
 
 
 @cache
@@ -38,7 +41,8 @@ def random_scenario(rng: np.random.Generator) -> dict[str, Any]:
     An arm starts anywhere, often near or outside its joint limits, with a stack of one to three
     tasks above a posture, targets within and out of reach, gains over more than a decade and up to
     five transitions that may overlap. Masses are off by up to 20 %, joints have friction, sensors
-    noise, and the tool may be pushed.
+    noise, and the tool may be pushed. In a third of the scenarios there are obstacles; they are drawn
+    last, so the others do not depend on them.
 
     Args:
         rng: Where every number comes from.
@@ -50,7 +54,7 @@ def random_scenario(rng: np.random.Generator) -> dict[str, Any]:
     robot = _robot(name)
     duration = round(float(rng.uniform(0.6, 1.2)), 3)
     tasks = _tasks(rng, robot)
-    return {
+    scenario = {
         "description": "drawn at random",
         "robot": name,
         "backend": str(rng.choice(["pinocchio", "mujoco"])),
@@ -64,6 +68,10 @@ def random_scenario(rng: np.random.Generator) -> dict[str, Any]:
         "joint_limits": {"clearance": CLEARANCE, "observer_time": OBSERVER_TIME},
         "plant": _plant(rng, robot, duration),
     }
+    if rng.random() < AMONG_OBSTACLES:
+        start = np.array(scenario["start"])
+        scenario["collisions"] = random_collisions(rng, robot, start, _ranges(robot))
+    return scenario
 
 
 def _ranges(robot: Robot) -> tuple[np.ndarray, np.ndarray]:
