@@ -125,9 +125,13 @@ def test_single_precision():
         assert (np.abs(tau) <= single.robot.torque_limit.astype(np.float32)).all()
         # Where bounds contradict each other their softness decides, which digits limit.
         kept = double.fleet.status.numpy() & int(osc.Status.LIMIT_LOST) == 0
-        error = np.abs(tau - want).max(axis=1)[kept] / np.abs(want).max(axis=1)[kept]
-        assert np.quantile(error, 0.99) < 1e-4
-        assert error.max() < 1e-2
+        error = np.abs(tau - want).max(axis=1) / np.abs(want).max(axis=1)
+        # What levels leave at a limit to those above is found by numbers that differ 1e5 times.
+        far = kept & (double.fleet.limits.numpy() == 0.0).all(axis=1)
+        assert far.sum() > 20
+        assert np.quantile(error[far], 0.99) < 1e-5
+        assert error[far].max() < 1e-3
+        assert np.quantile(error[kept], 0.99) < 5e-2
         double.fleet.reset()
         single.fleet.reset()
 
