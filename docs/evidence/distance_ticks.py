@@ -1,6 +1,6 @@
 """What kept distances cost in a tick: ``python docs/evidence/distance_ticks.py``.
 
-Ticks of a Panda with the rows of one ball and of nine, first far away, then where three pairs act, take
+Ticks of a Panda with the rows of one ball and of nine, first far away, then where two pairs act, take
 turns with ticks of the same tasks without distances in the same state, so that all see the same machine.
 """
 
@@ -67,7 +67,7 @@ def measure(near, q, v):
     alone = times["0"]
     for count, found in subjects.items():
         rows = 0 if found.collisions is None else len(found.collisions.layout().rows)
-        state = "none" if not count else ("far" if near is None else "three pairs act")
+        state = "none" if not count else ("far" if near is None else "two pairs act")
         p50, p99 = np.quantile(times[str(count)], (0.5, 0.99))
         ratio = times[str(count)] / np.median(alone)
         r50, r99 = np.quantile(ratio, (0.5, 0.99))
@@ -81,7 +81,7 @@ def main():
     print("| ---: | --- | ---: | ---: | ---: | ---: | ---: |")
     reference = np.array(osc.load_robot("panda").q_reference)
     measure(None, reference, np.zeros(7))
-    measure(*acting(3))
+    measure(*acting(2))
 
 
 if __name__ == "__main__":

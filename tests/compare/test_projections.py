@@ -6,7 +6,7 @@ import pytest
 import opspace as osc
 from opspace.compare import collision_experiment as experiment
 from opspace.compare.projections import AnotherProjection, BarrierProgram, Wanted
-from opspace.law.nearest import softness_of_rows
+from opspace.law.nearest import nearest_acceleration, softness_of_rows
 from opspace.scenario.build import build
 from opspace.scenario.load import load_scenario
 
@@ -26,8 +26,18 @@ class Same(AnotherProjection):
         softness = softness_of_rows(
             wish.G, wish.most, wish.U @ wish.U.T, np.array(guard.motors), guard.limits[3]
         )
-        lower, upper = np.array(bounds.lower), np.array(bounds.upper)
-        return wish.nearest(wish.W, lower, upper, wish.most, softness)
+        return nearest_acceleration(
+            wish.U,
+            wish.W,
+            wish.acceleration,
+            np.array(bounds.lower),
+            np.array(bounds.upper),
+            -wish.room - wish.balance,
+            wish.room - wish.balance,
+            wish.G,
+            wish.most,
+            softness,
+        ).acceleration
 
 
 def test_the_same_bounds_in_the_same_metric_give_the_same_torque():

@@ -16,7 +16,7 @@ TARGETS = {
 
 @pytest.mark.parametrize("kp", [25.0, 100.0])
 @pytest.mark.parametrize("target", TARGETS)
-def test_the_hand_of_a_panda_pays_nothing_for_its_posture(target, kp):
+def test_the_hand_of_a_panda_pays_next_to_nothing_for_its_posture(target, kp):
     """Its second joint is at its limit there, where the posture task pushes it."""
     robot = osc.load_robot("panda")
     position, orientation = TARGETS[target]

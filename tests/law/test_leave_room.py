@@ -63,8 +63,14 @@ def test_what_levels_below_add_is_half_of_what_a_limit_allows(seed):
 
 @given(seed=SEEDS, share=st.floats(1e-9, 1e-6))
 def test_a_level_that_has_hardly_come_changes_hardly_anything(seed, share):
+    """Not even where the levels below hardly move the joint, so that more turns would take more."""
     L, whitened, wanted, lower, upper = problem(seed)
-    without = leave_room(L, stacks_of(whitened, [(1.0, {0})]), wanted, lower, upper)
+    n, rng = len(L), np.random.default_rng(seed)
+    joint = np.linalg.inv(L).T[0]
+    row = joint / np.linalg.norm(joint) + 0.05 * rng.normal(size=n) / np.sqrt(n)
+    whitened = [WhitenedTask(row[None], np.zeros(1)), whitened[1]]
+    wanted[0], upper[0] = 30.0, 1.0
+    without = leave_room(L, stacks_of(whitened[:1], [(1.0, {0})]), wanted, lower, upper)
     coming = stacks_of(whitened, [(1.0 - share, {0}), (share, {0, 1})])
     found = leave_room(L, coming, wanted, lower, upper)
     difference = np.linalg.norm(L.T @ (found.acceleration - without.acceleration))
@@ -78,3 +84,14 @@ def test_the_answer_hardly_changes_where_the_wish_hardly_does(seed):
     other = wanted + 1e-6 * np.linalg.inv(L).T @ np.ones(len(L)) / np.sqrt(len(L))
     found = [leave_room(L, stacks, x, lower, upper).acceleration for x in (wanted, other)]
     assert np.linalg.norm(L.T @ (found[1] - found[0])) < 1e-6 * 50.0
+
+
+def test_rows_beyond_the_digits_leave_the_wish_as_it_is():
+    L, whitened, wanted, lower, upper = problem(3)
+    wanted, upper = np.abs(wanted), np.full(len(L), 0.1)
+    enormous = [WhitenedTask(1e9 * one.J, one.f) for one in whitened[:1]]
+    found = leave_room(L, stacks_of(enormous, [(1.0, {0})]), wanted, lower, upper)
+    np.testing.assert_allclose(found.acceleration, wanted, rtol=1e-12)
+    assert np.all(found.upper == 0.0)
+    usual = leave_room(L, stacks_of(whitened[:1], [(1.0, {0})]), wanted, lower, upper)
+    assert np.any(usual.upper > 0.0)

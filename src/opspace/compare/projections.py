@@ -66,12 +66,7 @@ class Wanted(NamedTuple):
     drift: np.ndarray
 
     def nearest(
-        self,
-        W: np.ndarray,
-        lower: np.ndarray,
-        upper: np.ndarray,
-        most: np.ndarray,
-        softness: np.ndarray | None = None,
+        self, W: np.ndarray, lower: np.ndarray, upper: np.ndarray, most: np.ndarray
     ) -> np.ndarray:
         """Project what is wanted on bounds of joints, motors and distances in a metric."""
         return nearest_acceleration(
@@ -84,7 +79,6 @@ class Wanted(NamedTuple):
             self.room - self.balance,
             self.G,
             most,
-            softness,
         ).acceleration
 
 

@@ -93,13 +93,14 @@ def _wants_more(work, n):
 def _leave_above(work, stacks, first, share, n):
     """Let what is wanted behind the first slots leave room; z is what all want together, √J/s."""
     bounds = work.bounds
-    _motions_left(work, stacks, first, n, False)
+    if not _motions_left(work, stacks, first, n, False):
+        return
     for a in range(n):
         bounds.above[a] = bounds.z[a]
         for b in range(n):
             bounds.above[a] -= bounds.P[a, b] * bounds.z[b]
-    _motions_left(work, stacks, first, n, True)
-    cholesky(bounds.P, n, 0.0, bounds.C)
+    if not _motions_left(work, stacks, first, n, True) or not cholesky(bounds.P, n, 0.0, bounds.C):
+        return
     count = _seen_rows(work, n)
     for a in range(n):
         bounds.x[a] = bounds.z[a]
@@ -119,14 +120,19 @@ def _leave_above(work, stacks, first, share, n):
 
 @jit
 def _motions_left(work, stacks, first, n, weighed):
-    """P = Σ_T w_T (I + κ Σ Ĵᵀ Ĵ of the first slots + Σ ω Ĵᵀ Ĵ of the others)⁻¹, into bounds.P."""
+    """P = Σ_T w_T (I + κ Σ Ĵᵀ Ĵ of the first slots + Σ ω Ĵᵀ Ĵ of the others)⁻¹, into bounds.P.
+
+    Returns:
+        Whether there are digits enough for it.
+    """
     P = work.bounds.P
     for a in range(n):
         for b in range(n):
             P[a, b] = 0.0
     for c in range(stacks):
         _weigh(work, work.corner_on[c], first, n, weighed)
-        cholesky(work.bounds.W, n, 0.0, work.bounds.C)
+        if not cholesky(work.bounds.W, n, 0.0, work.bounds.C):
+            return False
         for a in range(n):
             column = work.bounds.row
             for b in range(n):
@@ -136,6 +142,7 @@ def _motions_left(work, stacks, first, n, weighed):
             solve_lower_transposed(work.bounds.C, n, column)
             for b in range(n):
                 P[a, b] += work.corner_weight[c] * column[b]
+    return True
 
 
 @jit

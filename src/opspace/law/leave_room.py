@@ -126,8 +126,9 @@ def leave_room(
 
     and the same on the other side, as far as anything of level l is there: levels below l may use half
     of what a limit leaves, c = ½, and what those above do not use. At a limit, where nothing is left,
-    the levels below press no longer, so none above has to give way to them at rest. Nothing changes
-    unless `wants_more`.
+    the levels below press no longer, as far as they move the joint (`ROOM_SOFT`), and those above have
+    next to nothing to give way to at rest. Nothing changes unless `wants_more`, nor for a level whose
+    P_l is not positive definite in the digits there are: rows some 10⁵ times as large as others.
 
     Args:
         L: (n, n) Cholesky factor of the inertia.
@@ -152,8 +153,11 @@ def leave_room(
     for first in range(len(stacks.levels) - (not stacks.damped), 0, -1):
         members = stacks.levels[first - 1].members
         share = sum(weight for weight, present in stacks.corners if present & members)
-        above = x - motions_left(stacks, first, n, weighed=False) @ x
-        C = np.linalg.cholesky(motions_left(stacks, first, n, weighed=True))
+        try:
+            above = x - motions_left(stacks, first, n, weighed=False) @ x
+            C = np.linalg.cholesky(motions_left(stacks, first, n, weighed=True))
+        except np.linalg.LinAlgError:
+            continue
         z, bounds = np.linalg.solve(C, x), most + np.maximum(rows @ above, 0.0)
         seen = rows @ C
         z, multipliers = cleaned(z, seen, bounds, softness, ROOM_CLEANINGS)
