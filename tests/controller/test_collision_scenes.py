@@ -14,7 +14,7 @@ pytestmark = pytest.mark.slow
 STEPS = {
     "table": (0.5, 0.3),
     "self_fold": (0.5, 0.3),
-    "moving_ball": (0.75, 0.3),
+    "moving_ball": (0.5, 0.4),
     "gap": (0.5, 0.3),
     "clutter": (1.0, 0.5),
 }

@@ -5,7 +5,7 @@ import pytest
 
 import opspace as osc
 from opspace import Status
-from opspace.controller import ReferenceController
+from opspace.controller import ReferenceController, bounds
 
 # Of "close" the levels below the hand hardly move the joint.
 TARGETS = {
@@ -62,3 +62,27 @@ def test_both_forms_leave_the_same_room(seed):
         assert np.abs(compiled.tau - readable.tau).max() < 1e-8 * size
         assert compiled.status == readable.status
         assert compiled.limits == pytest.approx(readable.limits, abs=1e-6)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_of_a_speed_nothing_is_left_to_levels_above(monkeypatch, seed):
+    """Joints far from their limits that go as fast as they may are met by the projection alone."""
+    rng = np.random.default_rng(seed)
+    robot = osc.load_robot(("panda", "xarm7")[seed % 2])
+    v = rng.choice([-1.0, 1.0], robot.nv) * robot.velocity_limit
+    found = []
+    for alone in (False, True):
+        if alone:
+            monkeypatch.setattr(bounds, "wants_more", lambda *_: False)
+        for kind in (osc.Controller, ReferenceController):
+            tasks = [
+                osc.PositionTask(target=[0.3, 0.1, 0.4]),
+                osc.PostureTask(robot.q_reference + 0.3 * v),
+            ]
+            limits = osc.JointLimits(joints=dict.fromkeys(robot.joint_names, (-1e3, 1e3)))
+            controller = kind(robot, osc.Stack([limits, *tasks]))
+            found.append(controller.step(0.0, robot.q_reference, v))
+    assert Status.FILTERED in found[-1].status
+    size = np.abs(found[-1].tau).max()
+    for one in found[:-1]:
+        np.testing.assert_allclose(one.tau, found[-1].tau, atol=1e-9 * size)

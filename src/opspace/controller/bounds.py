@@ -79,11 +79,24 @@ class Bounds:
         """
         terms = [
             term._replace(
-                command=term.command - taken, haste=term.haste + taken, last=term.last - taken
+                command=term.command - taken,
+                haste=term.haste + taken,
+                last=term.last - taken,
+                by_position=term.by_position - taken,
             )
             for term, taken in zip(self.terms, more, strict=True)
         ]
         return replace(self, terms=terms)
+
+    def by_position(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return the bounds as far as positions ask for them, least and largest, (n,) rad/s²."""
+        lower, upper = np.full(self.bias.size, -np.inf), np.full(self.bias.size, np.inf)
+        for term in self.terms:
+            if term.side.sign > 0.0:
+                upper[term.side.index] = term.by_position
+            else:
+                lower[term.side.index] = -term.by_position
+        return lower, upper
 
     def passed(self, acceleration: np.ndarray) -> bool:
         """Tell whether a joint does more towards a limit than that one allows."""
@@ -144,7 +157,8 @@ class Kept(NamedTuple):
 def realise(bounds: Bounds, tau: np.ndarray, stacks: Callable[[], Stacks]) -> Kept:
     """Replace a torque by the nearest one with which no joint, motor or distance does more than it may.
 
-    Before that levels leave those above what is left of a limit, see `opspace.law.leave_room`.
+    Before that levels leave those above what is left of a limit, see `opspace.law.leave_room`; not of
+    a speed, at which nothing rests.
 
     Args:
         bounds: What they may.
@@ -158,12 +172,11 @@ def realise(bounds: Bounds, tau: np.ndarray, stacks: Callable[[], Stacks]) -> Ke
     acceleration = np.linalg.solve(M, tau - bias)
     taken = np.zeros(0 if near is None else near.most.size)
     upper = lower = np.zeros(bias.size)
-    gave_way, motors = wants_more(acceleration, bounds.lower, bounds.upper), False
+    by_position = bounds.by_position()
+    gave_way, motors = wants_more(acceleration, *by_position), False
     if gave_way:
         L = np.linalg.cholesky(M)
-        acceleration, upper, lower = leave_room(
-            L, stacks(), acceleration, bounds.lower, bounds.upper
-        )
+        acceleration, upper, lower = leave_room(L, stacks(), acceleration, *by_position)
         tau = M @ acceleration + bias
     if bounds.broken(tau, acceleration):
         found = nearest_acceleration(

@@ -25,6 +25,7 @@ class LimitTerms(NamedTuple):
         haste: How much of the command is there because the joint is too fast, rad/s².
         last: Acceleration with which the joint just stops at its limit, rad/s²; inf where it is not
             too fast.
+        by_position: The command if no speed were limited, rad/s².
     """
 
     side: Side
@@ -32,6 +33,7 @@ class LimitTerms(NamedTuple):
     margin: float
     haste: float = 0.0
     last: float = np.inf
+    by_position: float = np.inf
 
 
 def limit_terms(
@@ -57,16 +59,21 @@ def limit_terms(
     """
     beside = np.zeros(v.size) if disturbance is None else disturbance
     terms: list[LimitTerms] = []
-    for side, command, margin, (stopping, last) in zip(
+    for side, command, by_position, margin, (stopping, last) in zip(
         limits.sides,
         limits.commands(q, v),
+        limits.commands(q, v, speeds=False),
         limits.margins(),
         limits.hurries(q, v, most, period),
         strict=True,
     ):
         haste = max(command - stopping, 0.0)
         more = side.sign * float(beside[side.index])
-        terms.append(LimitTerms(side, command - haste - more, margin, haste, last - more))
+        terms.append(
+            LimitTerms(
+                side, command - haste - more, margin, haste, last - more, by_position - more
+            )
+        )
     return terms
 
 

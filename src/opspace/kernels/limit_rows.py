@@ -27,6 +27,7 @@ from opspace.kernels.dynamics import evaluate
 from opspace.kernels.inertia import acceleration_of, factor, whiten
 from opspace.kernels.limit_columns import (
     BRAKE,
+    BY_POSITION,
     COMMAND,
     DISTURBANCE,
     HASTE,
@@ -52,27 +53,34 @@ SCALED = int(Status.TORQUE_SCALED)
 
 @jit
 def begin_limits(work):
-    """Evaluate what every limit asks for or allows, rad/s², into its row of ``limit`` (limits, 7)."""
-    option = work.option
+    """Evaluate what every limit asks for or allows, rad/s², into its row of ``limit`` (limits, 11)."""
     for i in range(work.limit.shape[0]):
         limit = work.limit[i]
         j = work.limit_joint[i]
-        limit[COMMAND] = limit_command(
-            int(option[LIMIT_LAW]),
-            limit[SIGN] * (limit[POSITION] - joint_position(work, j)),
-            limit[SIGN] * work.v[j],
-            limit[BRAKE],
-            limit[SPEED],
-            option[LIMIT_K1],
-            option[LIMIT_K2],
-            option[LIMIT_KP],
-            option[LIMIT_BUFFER],
-        )
+        limit[COMMAND] = _command(work, limit, j, limit[SPEED])
+        limit[BY_POSITION] = _command(work, limit, j, math.inf) - limit[DISTURBANCE]
         limit[HASTE], limit[LAST], limit[SHIFT] = 0.0, math.inf, 0.0
-        if option[LIMIT_BOUND] != 0.0:
+        if work.option[LIMIT_BOUND] != 0.0:
             stop(work, limit, j)
         limit[COMMAND] -= limit[DISTURBANCE]
         limit[LAST] -= limit[DISTURBANCE]
+
+
+@jit
+def _command(work, limit, j, speed):
+    """What a limit of joint j asks for or allows, of a joint that may be so fast."""
+    option = work.option
+    return limit_command(
+        int(option[LIMIT_LAW]),
+        limit[SIGN] * (limit[POSITION] - joint_position(work, j)),
+        limit[SIGN] * work.v[j],
+        limit[BRAKE],
+        speed,
+        option[LIMIT_K1],
+        option[LIMIT_K2],
+        option[LIMIT_KP],
+        option[LIMIT_BUFFER],
+    )
 
 
 @jit
@@ -185,7 +193,8 @@ def look_through(work, stacks, n, kept):
 def realise(work, stacks, n):
     """Replace a torque and its acceleration by the nearest that the bounds allow.
 
-    Before that the levels below others leave these what is left of a limit.
+    Before that the levels below others leave these what is left of a limit; not of a speed, at which
+    nothing rests.
 
     Returns:
         What happened, in the numbers of `opspace.Status`.
@@ -284,6 +293,7 @@ def find_bounds(work, n):
     bounds = work.bounds
     for a in range(n):
         bounds.lower[a], bounds.upper[a] = -math.inf, math.inf
+        bounds.left[a], bounds.left[n + a] = math.inf, math.inf
         bounds.least[a], bounds.most[a] = -math.inf, math.inf
         if work.option[KEEP_TORQUE] != 0.0:
             bounds.least[a] = -work.torque_limit[a] - work.balance[a]
@@ -294,8 +304,10 @@ def find_bounds(work, n):
         limit, j = work.limit[i], work.limit_joint[i]
         if limit[SIGN] > 0.0:
             bounds.upper[j] = limit[COMMAND] - limit[SHIFT]
+            bounds.left[j] = limit[BY_POSITION] - limit[SHIFT]
         else:
             bounds.lower[j] = limit[SHIFT] - limit[COMMAND]
+            bounds.left[n + j] = limit[BY_POSITION] - limit[SHIFT]
     for i in range(work.limit.shape[0]):
         # Who must stop at once may do so, whatever the speed limit behind it would say, and what a joint
         # does more towards one limit in the middle of the tick it does less towards the other.

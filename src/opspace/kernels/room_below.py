@@ -20,7 +20,7 @@ def leave_room(work, stacks, n):
     Reads and writes joint_acceleration (n,), rad/s²; writes bounds.gave_way (2 n,), rad/s².
 
     Args:
-        work: `opspace.plan.records.TICK`; of its bounds lower and upper are read.
+        work: `opspace.plan.records.TICK`; of its bounds left is read.
         stacks: Number of stacks that were blended.
         n: Number of joints.
 
@@ -73,8 +73,7 @@ def _share(work, stacks, begin, end):
 @jit
 def _most(work, j, side):
     """What levels below others may use of a limit of joint j, rad/s²."""
-    most = work.bounds.upper[j] if side == 0 else -work.bounds.lower[j]
-    return LEFT * max(most, 0.0)
+    return LEFT * max(work.bounds.left[j + side * work.v.shape[0]], 0.0)
 
 
 @jit

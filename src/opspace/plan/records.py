@@ -158,7 +158,7 @@ TICK = RecordTable(
     _plan("slot_place", ("slots",), "those of `slot_on` that choose its place", dtype=_INT),
     _refresh("own", ("tasks",), "activation of each task by its own function", start=1.0),
     _plan("limit_joint", ("limits",), "joint of each limit", dtype=_INT),
-    _tuned("limit", ("limits", 10), "joint limits, see `opspace.kernels.limit_rows`"),
+    _tuned("limit", ("limits", 11), "joint limits, see `opspace.kernels.limit_rows`"),
     _plan("torque_limit", ("n",), "what the motors give to both sides of its middle", "N·m"),
     _plan("torque_middle", ("n",), "the middle of what the motors give", "N·m"),
     _plan("option", (OPTION_SIZE,), "options of the controller"),

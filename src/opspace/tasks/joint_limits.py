@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
@@ -231,18 +231,26 @@ class JointLimits(KnownAttributes):
         approach = Approach(d, towards, side.brake, side.speed)
         return self.law.hurries([approach], [most], self.k1, period)[0]
 
-    def commands(self, q: Array, v: Array) -> list[float]:
-        """Evaluate `admissible` of every side at positions (n,) and velocities (n,)."""
+    def commands(self, q: Array, v: Array, *, speeds: bool = True) -> list[float]:
+        """Evaluate `admissible` of every side.
+
+        Args:
+            q: (n,) joint positions, rad or m.
+            v: (n,) joint velocities, rad/s or m/s.
+            speeds: Whether speeds are limited, too.
+        """
+        sides = self.sides if speeds else [replace(s, speed=math.inf) for s in self.sides]
         if self.overridden:
-            return [self.admissible(s, float(q[s.index]), float(v[s.index])) for s in self.sides]
-        return self.law.commands(self._approaches(q, v), self.k1, self.k2, self.kp, self.buffer)
+            return [self.admissible(s, float(q[s.index]), float(v[s.index])) for s in sides]
+        approaches = self._approaches(q, v, sides)
+        return self.law.commands(approaches, self.k1, self.k2, self.kp, self.buffer)
 
     def presences(self, q: Array, v: Array) -> list[float]:
         """Evaluate `presence` of every side at positions (n,) and velocities (n,)."""
         if self.overridden:
             return [self.presence(s, float(q[s.index]), float(v[s.index])) for s in self.sides]
         code = PROFILES.index(self.profile)
-        return self.law.presences(self._approaches(q, v), self.buffer, code)
+        return self.law.presences(self._approaches(q, v, self.sides), self.buffer, code)
 
     def hurries(self, q: Array, v: Array, most: Array, period: float) -> list[tuple[float, float]]:
         """Evaluate `hurry` of every side at positions, velocities and for braking, (n,) each."""
@@ -253,19 +261,19 @@ class JointLimits(KnownAttributes):
                 for s in self.sides
             ]
         given = [braking[s.index] for s in self.sides]
-        return self.law.hurries(self._approaches(q, v), given, self.k1, period)
+        return self.law.hurries(self._approaches(q, v, self.sides), given, self.k1, period)
 
     def margins(self) -> list[float]:
         """Evaluate `margin` of every side."""
         return [self.margin(side) for side in self.sides]
 
-    def _approaches(self, q: Array, v: Array) -> list[Approach]:
+    def _approaches(self, q: Array, v: Array, sides: Sequence[Side]) -> list[Approach]:
         positions, speeds = q.tolist(), v.tolist()
         return [
             Approach(
                 s.sign * (s.limit - positions[s.index]), s.sign * speeds[s.index], s.brake, s.speed
             )
-            for s in self.sides
+            for s in sides
         ]
 
     def allowed_speed(self, side: Side, distance: float) -> float:
