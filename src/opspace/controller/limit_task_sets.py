@@ -70,9 +70,7 @@ def limit_terms(
         haste = max(command - stopping, 0.0)
         more = side.sign * float(beside[side.index])
         terms.append(
-            LimitTerms(
-                side, command - haste - more, margin, haste, last - more, by_position - more
-            )
+            LimitTerms(side, command - haste - more, margin, haste, last - more, by_position - more)
         )
     return terms
 
