@@ -60,8 +60,19 @@ def random_obstacles(rng):
         yield ObstacleEntry(**random_obstacle(rng, place)).build(str(i))
 
 
-def arm(name, rng, obstacles):
-    """A controller with a random target and stiffness that swaps two tasks on the way."""
+@cache
+def watch_of(name, which):
+    """A controller of its own for each arm that looks at distances, and its guard."""
+    guard = osc.CollisionAvoidance(**shapes_and_pairs(name))
+    stack = osc.Stack([osc.PostureTask()])
+    return osc.Controller(osc.load_robot(name), stack, collisions=guard), guard
+
+
+def arm(name, rng, obstacles, which=0):
+    """A controller with a random target and stiffness that swaps two tasks on the way.
+
+    Also one that looks at distances, for the arm of this number.
+    """
     robot = osc.load_robot(name)
     guard = osc.CollisionAvoidance(*obstacles, **shapes_and_pairs(name))
     kp = float(rng.uniform(50.0, 400.0))
@@ -69,8 +80,9 @@ def arm(name, rng, obstacles):
     stack = osc.Stack([osc.JointLimits(), osc.OrientationTask(), position, osc.PostureTask()])
     controller = osc.Controller(robot, stack, torque_limits="priority", collisions=guard)
     stack.swap(position, stack["orientation"], duration=0.5, start_time=0.2)
-    probe = osc.CollisionAvoidance(*obstacles, **shapes_and_pairs(name))
-    watch = osc.Controller(robot.fresh(), osc.Stack([osc.PostureTask()]), collisions=probe)
+    watch, probe = watch_of(name, which)
+    probe.remove(*[obstacle.name for obstacle in probe.obstacles])
+    probe.add(*obstacles)
     return controller, watch
 
 
@@ -113,7 +125,7 @@ def one_start(kind, seed):
             osc.OtherRobot(osc.load_robot("ur5"), sign * aside, shapes=shapes, share=0.5)
             for sign in (1.0, -1.0)
         ]
-        made = [arm("ur5", rng, other.obstacles) for other in others]
+        made = [arm("ur5", rng, other.obstacles, i) for i, other in enumerate(others)]
     else:
         made = [arm(kind, rng, list(random_obstacles(rng)))]
 

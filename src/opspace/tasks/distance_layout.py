@@ -83,7 +83,9 @@ class DistanceLayout:
         np.minimum.at(near, self.pair, distance)
         np.maximum.at(most, self.pair, taken)
         order = np.argsort(near, kind="stable")
-        return ByName((self.pairs[k], Distance(float(near[k]), float(most[k]))) for k in order)
+        names = [self.pairs[k] for k in order.tolist()]
+        told = map(Distance, near[order].tolist(), most[order].tolist())
+        return ByName(zip(names, told, strict=True))
 
 
 def lay_out(
