@@ -194,10 +194,10 @@ class Obstacle:
         self.place(VectorWay(now, end, t, LED))
 
     def put_back(self, placing: Placing) -> None:
-        """Let it be exactly where a tick found it, to the last bit, whatever it follows.
+        """Let it be exactly so, to the last bit, whatever it follows.
 
         Args:
-            placing: What `placing` gave.
+            placing: What `placing` of it or of another one gave; it is not checked.
         """
         self._state = placing, None
         CHANGES.last = object()

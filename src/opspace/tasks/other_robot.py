@@ -67,13 +67,13 @@ class OtherRobot:
             raise InputError(f"{name!r} has no shapes")
         self._robot = robot.fresh()
         self._frames = [self._robot.frame_id(shape.frame) for shape in found]
-        self._places = [along(shape) for shape in found]
+        places = [along(shape) for shape in found]
+        self._axes = np.array([axes for axes, _, _ in places])
+        self._middles = np.array([middle for _, middle, _ in places])
         ignored = tuple(ignore)
         self.obstacles: tuple[Obstacle, ...] = tuple(
             _obstacle(shape, 2.0 * half, word, ignored)
-            for shape, (*_, half), word in zip(
-                found, self._places, _words(name, found), strict=True
-            )
+            for shape, (*_, half), word in zip(found, places, _words(name, found), strict=True)
         )
         for obstacle in self.obstacles:
             obstacle.share = part
@@ -97,7 +97,7 @@ class OtherRobot:
             finite_array(q, (robot.nq,), "q"), finite_array(v, (robot.nv,), "v")
         )
         for obstacle, placing in zip(self.obstacles, placings, strict=True):
-            obstacle.place(placing.position, placing.rotation, placing.velocity)
+            obstacle.put_back(placing)
 
     def play(self, course: Reference) -> None:
         """Let the links go as the robot does that follows a reference of its joints exactly.
@@ -131,15 +131,14 @@ class OtherRobot:
         """Where the capsules of the links are, and how they move."""
         robot, base = self._robot, self._rotation
         robot.update(q, v)
-        found: list[Placing] = []
-        for frame, (axes, middle, _) in zip(self._frames, self._places, strict=True):
-            R, twist = robot.rotation(frame), robot.velocity(frame)
-            arm = R @ middle
-            linear = base @ (twist[:3] + np.cross(twist[3:], arm))
-            position = self._position + base @ (robot.position(frame) + arm)
-            velocity = np.concatenate([linear, base @ twist[3:]])
-            found.append(Placing(base @ R @ axes, position, velocity))
-        return found
+        R = np.array([robot.rotation(frame) for frame in self._frames])
+        twist = np.array([robot.velocity(frame) for frame in self._frames])
+        arm = (R @ self._middles[:, :, None])[:, :, 0]
+        linear = twist[:, :3] + np.cross(twist[:, 3:], arm)
+        origin = np.array([robot.position(frame) for frame in self._frames])
+        velocity = np.concatenate([linear @ base.T, twist[:, 3:] @ base.T], axis=1)
+        position = self._position + (origin + arm) @ base.T
+        return list(map(Placing, base @ R @ self._axes, position, velocity))
 
 
 def _obstacle(shape: LinkCapsule, length: float, name: str, ignore: tuple[str, ...]) -> Obstacle:
