@@ -75,7 +75,7 @@ def nearest_acceleration(inertia, acceleration, bounds, distances):
     # Several times, what softness leaves of an excess included.
     for turn in range(CLEANINGS):
         while True:
-            project_on_bounds(count, n, bounds)
+            project_on_bounds(count, n, bounds.normal, bounds)
             for a in range(n):
                 acceleration[a] = bounds.y[a]
             solve_lower_transposed(bounds.C, n, acceleration)
@@ -159,12 +159,13 @@ def _two_sided(count, n, owner, least, most, softness, bounds):
 
 
 @jit
-def project_on_bounds(count, n, bounds):
-    """Find y = x less the normals times their multipliers, none of which is negative.
+def project_on_bounds(count, n, way, bounds):
+    """Find y = x less the ways times their multipliers, none of which is negative.
 
     Args:
         count: Number of bounds.
         n: Size of x.
+        way: (count, n) where x goes for each bound; the normals themselves where near is ‖y − x‖.
         bounds: `BOUNDS`; x, normal, bound and softness are read, y and multiplier written.
     """
     for i in range(count):
@@ -181,16 +182,14 @@ def project_on_bounds(count, n, bounds):
         bounds.active[size] = worst
         known, size = size, size + 1
         while size > 0:
-            multipliers(n, known, size, bounds)
+            multipliers(n, known, size, way, bounds)
             if advance(size, bounds):
                 break
             known, size = _drop(size, bounds)
         for a in range(n):
             bounds.y[a] = bounds.x[a]
             for k in range(size):
-                bounds.y[a] -= (
-                    bounds.normal[bounds.active[k], a] * bounds.multiplier[bounds.active[k]]
-                )
+                bounds.y[a] -= way[bounds.active[k], a] * bounds.multiplier[bounds.active[k]]
 
 
 @jit
@@ -208,8 +207,8 @@ def _most_broken(count, n, bounds):
 
 
 @jit
-def multipliers(n, known, size, bounds):
-    """Solve (N Nᵀ + softness) λ = N x − bound for the bounds that hold, of which some are factored."""
+def multipliers(n, known, size, way, bounds):
+    """Solve (N wayᵀ + softness) λ = N x − bound for the bounds that hold, some of which are factored."""
     for k in range(size):
         i = bounds.active[k]
         bounds.r[k] = -bounds.bound[i]
@@ -221,7 +220,7 @@ def multipliers(n, known, size, bounds):
             j = bounds.active[b]
             product = 0.0
             for a in range(n):
-                product += bounds.normal[i, a] * bounds.normal[j, a]
+                product += bounds.normal[i, a] * way[j, a]
             bounds.G[k, b] = product
         bounds.G[k, k] += bounds.softness[i]
         cholesky_row(bounds.G, k, 0.0, bounds.factor)

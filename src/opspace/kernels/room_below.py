@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 
-from opspace.kernels.algebra import cholesky, solve_lower, solve_lower_transposed
 from opspace.kernels.compiled_scalars import level_weight
 from opspace.kernels.inertia import acceleration_of, unit_row, whitened_of
 from opspace.kernels.projection import project_on_bounds
@@ -93,85 +92,107 @@ def _wants_more(work, n):
 def _leave_above(work, stacks, first, share, n):
     """Let what is wanted behind the first slots leave room; z is what all want together, √J/s."""
     bounds = work.bounds
-    if not _motions_left(work, stacks, first, n, False):
-        return
-    for a in range(n):
-        bounds.above[a] = bounds.z[a]
-        for b in range(n):
-            bounds.above[a] -= bounds.P[a, b] * bounds.z[b]
-    if not _motions_left(work, stacks, first, n, True) or not cholesky(bounds.P, n, 0.0, bounds.C):
-        return
+    _motions_left(work, stacks, first, n)
     count = _seen_rows(work, n)
     for a in range(n):
         bounds.x[a] = bounds.z[a]
-    solve_lower(bounds.C, n, bounds.x)
     for _ in range(ROOM_CLEANINGS):
-        project_on_bounds(count, n, bounds)
+        project_on_bounds(count, n, bounds.way, bounds)
         for a in range(n):
             bounds.x[a] = bounds.y[a]
         for i in range(count):
             bounds.gave_way[bounds.owner[i]] += share * bounds.multiplier[i] * bounds.size[i]
     for a in range(n):
-        left = bounds.x[a] / bounds.C[a, a]  # the factor's diagonal is inverted
-        for b in range(a):
-            left += bounds.C[a, b] * bounds.x[b]
-        bounds.z[a] += share * (left - bounds.z[a])
+        bounds.z[a] += share * (bounds.x[a] - bounds.z[a])
 
 
 @jit
-def _motions_left(work, stacks, first, n, weighed):
+def _motions_left(work, stacks, first, n):
     """P = Σ_T w_T (I + κ Σ Ĵᵀ Ĵ of the first slots + Σ ω Ĵᵀ Ĵ of the others)⁻¹, into bounds.P.
 
-    Returns:
-        Whether there are digits enough for it.
+    Without the others it is what the first slots do not see; what is left of z goes into bounds.above.
     """
-    P = work.bounds.P
+    bounds = work.bounds
     for a in range(n):
+        bounds.above[a] = bounds.z[a]
         for b in range(n):
-            P[a, b] = 0.0
+            bounds.P[a, b] = 0.0
     for c in range(stacks):
-        _weigh(work, work.corner_on[c], first, n, weighed)
-        if not cholesky(work.bounds.W, n, 0.0, work.bounds.C):
-            return False
+        present, weight = work.corner_on[c], work.corner_weight[c]
+        _not_seen(work, present, first, n)
+        _take_unseen(bounds, weight, n)
+        _narrow_by_others(work, present, first, n)
         for a in range(n):
-            column = work.bounds.row
             for b in range(n):
-                column[b] = 0.0
-            column[a] = 1.0
-            solve_lower(work.bounds.C, n, column)
-            solve_lower_transposed(work.bounds.C, n, column)
-            for b in range(n):
-                P[a, b] += work.corner_weight[c] * column[b]
-    return True
+                for k in range(n):
+                    bounds.P[a, b] += weight * bounds.S[a, k] * bounds.S[b, k]
 
 
 @jit
-def _weigh(work, present, first, n, weighed):
-    """W = I + κ Σ Ĵᵀ Ĵ of the first slots + Σ ω Ĵᵀ Ĵ of the others, of one stack."""
-    slots, W, Jw = work.slots, work.bounds.W, work.Jw
+def _not_seen(work, present, first, n):
+    """S Sᵀ = (I + κ Σ Ĵᵀ Ĵ of the first slots)⁻¹ of one stack, into bounds.S."""
+    S = work.bounds.S
     for a in range(n):
         for b in range(n):
-            W[a, b] = 0.0
-        W[a, a] = 1.0
+            S[a, b] = 0.0
+        S[a, a] = 1.0
+    for s in range(first):
+        if present & slot_bit(s):
+            for row in range(work.slots[s, 1], work.slots[s, 1] + work.slots[s, 2]):
+                _narrow(work.Jw[row], UNSEEN, n, work.bounds)
+
+
+@jit
+def _narrow_by_others(work, present, first, n):
+    """Add Σ ω Ĵᵀ Ĵ of the slots that are not the first to the inverse of S Sᵀ, of one stack."""
+    slots = work.slots
     below, here = 0.0, 0.0
-    for s in range(slots.shape[0] - 1, -1, -1):
+    for s in range(slots.shape[0] - 1, first - 1, -1):
         if present & slot_bit(s):
             here = 1.0
-            factor = UNSEEN
-            if s >= first:
-                factor = level_weight(below) if weighed else 0.0
             for row in range(slots[s, 1], slots[s, 1] + slots[s, 2]):
-                for a in range(n):
-                    for b in range(n):
-                        W[a, b] += factor * Jw[row, a] * Jw[row, b]
+                _narrow(work.Jw[row], level_weight(below), n, work.bounds)
         if s == 0 or slots[s - 1, 0] != slots[s, 0]:
             below += here
             here = 0.0
 
 
 @jit
+def _narrow(row, weight, n, bounds):
+    """Count a row in: S Sᵀ becomes (P⁻¹ + weight rowᵀ row)⁻¹; see `opspace.law.leave_room.narrowed`."""
+    S, f = bounds.S, bounds.row
+    for b in range(n):
+        f[b] = 0.0
+    for a in range(n):
+        for b in range(n):
+            f[b] += row[a] * S[a, b]
+    seen, unseen = 0.0, 1.0 / weight
+    for b in range(n):
+        seen += f[b] * f[b]
+    scale = 1.0 / (seen + unseen + math.sqrt(unseen * (seen + unseen)))
+    for a in range(n):
+        along = 0.0
+        for b in range(n):
+            along += S[a, b] * f[b]
+        along *= scale
+        for b in range(n):
+            S[a, b] -= along * f[b]
+
+
+@jit
+def _take_unseen(bounds, weight, n):
+    """Take S Sᵀ z, as far as a stack is there, from bounds.above."""
+    for k in range(n):
+        along = 0.0
+        for a in range(n):
+            along += bounds.S[a, k] * bounds.z[a]
+        for a in range(n):
+            bounds.above[a] -= weight * along * bounds.S[a, k]
+
+
+@jit
 def _seen_rows(work, n):
-    """Write every limit as row · x <= bound, the row as far as levels behind the first slots move it.
+    """Write every limit as row · x <= bound, and the way of what is behind the first slots, P row.
 
     Returns:
         How many there are.
@@ -192,11 +213,12 @@ def _seen_rows(work, n):
                 continue
             seen = 0.0
             for a in range(n):
-                total = bounds.row[a] / bounds.C[a, a]
-                for b in range(a + 1, n):
-                    total += bounds.row[b] * bounds.C[b, a]
-                bounds.normal[count, a] = sign * total / size
-                seen += bounds.normal[count, a] * bounds.normal[count, a]
+                along = 0.0
+                for b in range(n):
+                    along += bounds.P[a, b] * bounds.row[b]
+                bounds.normal[count, a] = sign * bounds.row[a] / size
+                bounds.way[count, a] = sign * along / size
+                seen += bounds.normal[count, a] * bounds.way[count, a]
             bounds.bound[count] = (most + max(sign * above, 0.0)) / size
             bounds.softness[count] = ROOM_SOFT
             bounds.owner[count], bounds.size[count] = j + side * n, seen * size
