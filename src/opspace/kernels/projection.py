@@ -75,7 +75,7 @@ def nearest_acceleration(inertia, acceleration, bounds, distances):
     # Several times, what softness leaves of an excess included.
     for turn in range(CLEANINGS):
         while True:
-            project_on_bounds(count, n, bounds.normal, bounds)
+            project_on_bounds(count, n, 0, bounds.normal, bounds)
             for a in range(n):
                 acceleration[a] = bounds.y[a]
             solve_lower_transposed(bounds.C, n, acceleration)
@@ -159,28 +159,25 @@ def _two_sided(count, n, owner, least, most, softness, bounds):
 
 
 @jit
-def project_on_bounds(count, n, way, bounds):
+def project_on_bounds(count, n, held, way, bounds):
     """Find y = x less the ways times their multipliers, none of which is negative.
 
     Args:
         count: Number of bounds.
         n: Size of x.
+        held: How many bounds held last, if only x is another one since; 0 to begin with none.
         way: (count, n) where x goes for each bound; the normals themselves where near is ‖y − x‖.
         bounds: `BOUNDS`; x, normal, bound and softness are read, y and multiplier written.
+
+    Returns:
+        How many bounds hold.
     """
     for i in range(count):
         bounds.multiplier[i], bounds.scale[i] = 0.0, abs(bounds.bound[i])
         for a in range(n):
             bounds.scale[i] += abs(bounds.normal[i, a] * bounds.x[a])
-    for a in range(n):
-        bounds.y[a] = bounds.x[a]
-    size = 0
-    for _ in range(10 * count):
-        worst = _most_broken(count, n, bounds)
-        if worst < 0:
-            break
-        bounds.active[size] = worst
-        known, size = size, size + 1
+    known, size = held, held
+    for _ in range(10 * count + 1):
         while size > 0:
             multipliers(n, known, size, way, bounds)
             if advance(size, bounds):
@@ -190,6 +187,12 @@ def project_on_bounds(count, n, way, bounds):
             bounds.y[a] = bounds.x[a]
             for k in range(size):
                 bounds.y[a] -= way[bounds.active[k], a] * bounds.multiplier[bounds.active[k]]
+        worst = _most_broken(count, n, bounds)
+        if worst < 0:
+            break
+        bounds.active[size] = worst
+        known, size = size, size + 1
+    return size
 
 
 @jit

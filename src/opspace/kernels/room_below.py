@@ -29,7 +29,7 @@ def leave_room(work, stacks, n):
     bounds = work.bounds
     for a in range(2 * n):
         bounds.gave_way[a] = 0.0
-    if not _wants_more(work, n):
+    if not _over(work, work.joint_acceleration, BROKEN, n):
         return False
     whitened_of(work.inertia, work.joint_acceleration, bounds.z)
     end, below = work.slots.shape[0], work.rest[n] != 0.0
@@ -77,13 +77,13 @@ def _most(work, j, side):
 
 
 @jit
-def _wants_more(work, n):
-    x = work.joint_acceleration
+def _over(work, acceleration, tolerance, n):
+    """Whether a joint does more than what levels below others may use."""
     for j in range(n):
         for side in range(2):
             most = _most(work, j, side)
-            towards = x[j] if side == 0 else -x[j]
-            if towards - most > BROKEN * max(1.0, most):
+            towards = acceleration[j] if side == 0 else -acceleration[j]
+            if towards - most > tolerance * max(1.0, most):
                 return True
     return False
 
@@ -92,12 +92,19 @@ def _wants_more(work, n):
 def _leave_above(work, stacks, first, share, n):
     """Let what is wanted behind the first slots leave room; z is what all want together, √J/s."""
     bounds = work.bounds
-    _motions_left(work, stacks, first, n)
-    count = _seen_rows(work, n)
     for a in range(n):
         bounds.x[a] = bounds.z[a]
+        bounds.row[a] = bounds.z[a]
+    acceleration_of(work.inertia, bounds.row)
+    if not _over(work, bounds.row, 0.0, n):
+        return
+    _motions_left(work, stacks, first, n)
+    count = _seen_rows(work, n)
+    held = 0
     for _ in range(ROOM_CLEANINGS):
-        project_on_bounds(count, n, bounds.way, bounds)
+        held = project_on_bounds(count, n, held, bounds.way, bounds)
+        if held == 0:
+            break
         for a in range(n):
             bounds.x[a] = bounds.y[a]
         for i in range(count):
@@ -113,81 +120,92 @@ def _motions_left(work, stacks, first, n):
     Without the others it is what the first slots do not see; what is left of z goes into bounds.above.
     """
     bounds = work.bounds
+    P, UD = bounds.P, bounds.UD
     for a in range(n):
         bounds.above[a] = bounds.z[a]
         for b in range(n):
-            bounds.P[a, b] = 0.0
+            P[a, b] = 0.0
     for c in range(stacks):
         present, weight = work.corner_on[c], work.corner_weight[c]
         _not_seen(work, present, first, n)
         _take_unseen(bounds, weight, n)
         _narrow_by_others(work, present, first, n)
-        for a in range(n):
-            for b in range(n):
-                for k in range(n):
-                    bounds.P[a, b] += weight * bounds.S[a, k] * bounds.S[b, k]
+        for k in range(n):
+            factor = weight * UD[k, k]
+            for a in range(k):
+                for b in range(a + 1):
+                    P[a, b] += factor * UD[k, a] * UD[k, b]
+                P[k, a] += factor * UD[k, a]
+            P[k, k] += factor
+    for a in range(n):
+        for b in range(a):
+            P[b, a] = P[a, b]
 
 
 @jit
 def _not_seen(work, present, first, n):
-    """S Sᵀ = (I + κ Σ Ĵᵀ Ĵ of the first slots)⁻¹ of one stack, into bounds.S."""
-    S = work.bounds.S
+    """U D Uᵀ = (I + κ Σ Ĵᵀ Ĵ of the first slots)⁻¹ of one stack, into bounds.UD."""
+    UD = work.bounds.UD
     for a in range(n):
-        for b in range(n):
-            S[a, b] = 0.0
-        S[a, a] = 1.0
+        for b in range(a):
+            UD[a, b] = 0.0
+        UD[a, a] = 1.0
     for s in range(first):
         if present & slot_bit(s):
             for row in range(work.slots[s, 1], work.slots[s, 1] + work.slots[s, 2]):
-                _narrow(work.Jw[row], UNSEEN, n, work.bounds)
+                _narrow(work.Jw[row], UNSEEN, n, UD, work.bounds.row)
 
 
 @jit
 def _narrow_by_others(work, present, first, n):
-    """Add Σ ω Ĵᵀ Ĵ of the slots that are not the first to the inverse of S Sᵀ, of one stack."""
+    """Count in Σ ω Ĵᵀ Ĵ of the slots of one stack that are not the first."""
     slots = work.slots
     below, here = 0.0, 0.0
     for s in range(slots.shape[0] - 1, first - 1, -1):
         if present & slot_bit(s):
             here = 1.0
             for row in range(slots[s, 1], slots[s, 1] + slots[s, 2]):
-                _narrow(work.Jw[row], level_weight(below), n, work.bounds)
+                _narrow(work.Jw[row], level_weight(below), n, work.bounds.UD, work.bounds.row)
         if s == 0 or slots[s - 1, 0] != slots[s, 0]:
             below += here
             here = 0.0
 
 
 @jit
-def _narrow(row, weight, n, bounds):
-    """Count a row in: S Sᵀ becomes (P⁻¹ + weight rowᵀ row)⁻¹; see `opspace.law.leave_room.narrowed`."""
-    S, f = bounds.S, bounds.row
-    for b in range(n):
-        f[b] = 0.0
-    for a in range(n):
-        for b in range(n):
-            f[b] += row[a] * S[a, b]
-    seen, unseen = 0.0, 1.0 / weight
-    for b in range(n):
-        seen += f[b] * f[b]
-    scale = 1.0 / (seen + unseen + math.sqrt(unseen * (seen + unseen)))
-    for a in range(n):
-        along = 0.0
-        for b in range(n):
-            along += S[a, b] * f[b]
-        along *= scale
-        for b in range(n):
-            S[a, b] -= along * f[b]
+def _narrow(row, weight, n, UD, gain):
+    """Count a row in: U D Uᵀ becomes ((U D Uᵀ)⁻¹ + weight rowᵀ row)⁻¹.
+
+    Bierman's update of a covariance (Factorization Methods for Discrete Sequential Estimation, 1977,
+    chapter V): as exact as one of a root, at half the products.
+    """
+    total = 1.0 / weight
+    for j in range(n):
+        f = row[j]
+        for i in range(j):
+            f += UD[j, i] * row[i]
+        seen, before = UD[j, j] * f, total
+        total += f * seen
+        UD[j, j] *= before / total
+        factor = f / before
+        for i in range(j):
+            was = UD[j, i]
+            UD[j, i] = was - factor * gain[i]
+            gain[i] += seen * was
+        gain[j] = seen
 
 
 @jit
 def _take_unseen(bounds, weight, n):
-    """Take S Sᵀ z, as far as a stack is there, from bounds.above."""
+    """Take U D Uᵀ z, as far as a stack is there, from bounds.above."""
+    UD, z, above = bounds.UD, bounds.z, bounds.above
     for k in range(n):
-        along = 0.0
-        for a in range(n):
-            along += bounds.S[a, k] * bounds.z[a]
-        for a in range(n):
-            bounds.above[a] -= weight * along * bounds.S[a, k]
+        f = z[k]
+        for a in range(k):
+            f += UD[k, a] * z[a]
+        f *= weight * UD[k, k]
+        for a in range(k):
+            above[a] -= f * UD[k, a]
+        above[k] -= f
 
 
 @jit
@@ -200,27 +218,45 @@ def _seen_rows(work, n):
     bounds = work.bounds
     count = 0
     for j in range(n):
+        if not min(_most(work, j, 0), _most(work, j, 1)) < UNBOUNDED:
+            continue
         unit_row(work.inertia, j, 1.0, bounds.row)
         size, above = 0.0, 0.0
         for a in range(n):
             size += bounds.row[a] * bounds.row[a]
             above += bounds.row[a] * bounds.above[a]
         size = math.sqrt(size)
+        seen = _way(bounds, size, n)
         for side in range(2):
             sign = 1.0 if side == 0 else -1.0
             most = _most(work, j, side)
             if not most < UNBOUNDED:
                 continue
-            seen = 0.0
             for a in range(n):
-                along = 0.0
-                for b in range(n):
-                    along += bounds.P[a, b] * bounds.row[b]
-                bounds.normal[count, a] = sign * bounds.row[a] / size
-                bounds.way[count, a] = sign * along / size
-                seen += bounds.normal[count, a] * bounds.way[count, a]
+                bounds.normal[count, a] = sign * bounds.row[a]
+                bounds.way[count, a] = sign * bounds.y[a]
             bounds.bound[count] = (most + max(sign * above, 0.0)) / size
             bounds.softness[count] = ROOM_SOFT
             bounds.owner[count], bounds.size[count] = j + side * n, seen * size
             count += 1
     return count
+
+
+@jit
+def _way(bounds, size, n):
+    """Give bounds.row unit length, and fill bounds.y (n,) with P row.
+
+    Returns:
+        row · P row.
+    """
+    P, row, y = bounds.P, bounds.row, bounds.y
+    seen = 0.0
+    for a in range(n):
+        row[a] /= size
+    for a in range(n):
+        along = 0.0
+        for b in range(n):
+            along += P[a, b] * row[b]
+        y[a] = along
+        seen += along * row[a]
+    return seen

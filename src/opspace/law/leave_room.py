@@ -177,6 +177,8 @@ def leave_room(
     for first in range(len(stacks.levels) - (not stacks.damped), 0, -1):
         members = stacks.levels[first - 1].members
         share = sum(weight for weight, present in stacks.corners if present & members)
+        if not np.any(rows @ x > most):
+            continue
         above = x - motions_left(stacks, first, n, weighed=False) @ x
         ways = rows @ motions_left(stacks, first, n, weighed=True)
         bounds = most + np.maximum(rows @ above, 0.0)
