@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from opspace.law import Stacks, Weighted, leave_room, motions_left, wants_more
 from opspace.law.hierarchy import Level, WhitenedTask
-from opspace.law.scalars import LEFT, ROOM_CLEANINGS, ROOM_SOFT
+from opspace.law.scalars import LEFT, ROOM_CLEANINGS, ROOM_SOFT, UNSEEN, level_weight
 
 SEEDS = st.integers(0, 2**32 - 1)
 INF = np.inf
@@ -86,12 +86,31 @@ def test_the_answer_hardly_changes_where_the_wish_hardly_does(seed):
     assert np.linalg.norm(L.T @ (found[1] - found[0])) < 1e-6 * 50.0
 
 
-def test_rows_beyond_the_digits_leave_the_wish_as_it_is():
-    L, whitened, wanted, lower, upper = problem(3)
-    wanted, upper = np.abs(wanted), np.full(len(L), 0.1)
-    enormous = [WhitenedTask(1e9 * one.J, one.f) for one in whitened[:1]]
-    found = leave_room(L, stacks_of(enormous, [(1.0, {0})]), wanted, lower, upper)
-    np.testing.assert_allclose(found.acceleration, wanted, rtol=1e-12)
-    assert np.all(found.upper == 0.0)
-    usual = leave_room(L, stacks_of(whitened[:1], [(1.0, {0})]), wanted, lower, upper)
-    assert np.any(usual.upper > 0.0)
+@given(seed=SEEDS)
+def test_what_is_left_is_the_inverse_of_what_is_counted(seed):
+    """Found row by row, with as many digits for rows that see much as the inverse has for none."""
+    _, whitened, *_ = problem(seed)
+    n = whitened[0].J.shape[1]
+    stacks = stacks_of(whitened, [(0.3, {0}), (0.7, {0, 1})])
+    for weighed in (False, True):
+        found = motions_left(stacks, 1, n, weighed=weighed)
+        upper, other = (one.J.T @ one.J for one in whitened)
+        first = np.eye(n) + UNSEEN * upper
+        both = first + (level_weight(0) * other if weighed else 0.0)
+        want = 0.3 * np.linalg.inv(first) + 0.7 * np.linalg.inv(both)
+        np.testing.assert_allclose(found, want, atol=1e-9)
+        assert np.all(np.linalg.eigvalsh(found) > -1e-15)
+
+
+@given(seed=SEEDS)
+def test_rows_of_any_length_are_left_alone_in_the_digits_there_are(seed):
+    """Rows 10⁹ times as long as others, with which no matrix of all has an inverse in its digits."""
+    L, whitened, wanted, lower, upper = problem(seed)
+    found = []
+    for factor in (1e4, 1e9):
+        longer = [WhitenedTask(factor * one.J, one.f) for one in whitened[:1]]
+        found.append(leave_room(L, stacks_of(longer, [(1.0, {0})]), wanted, lower, upper))
+    size = np.linalg.norm(L.T @ wanted)
+    change = L.T @ (found[0].acceleration - found[1].acceleration)
+    assert np.linalg.norm(change) < 1e-6 * size
+    np.testing.assert_allclose(found[0].upper, found[1].upper, rtol=1e-5, atol=1e-6 * size)

@@ -85,7 +85,7 @@ def settle(count, n, known, size, stance):
         tolerance[i] = ROUNDING * scale
     for _ in range(10 * count + 1):
         while size > 0:
-            multipliers(n, known, size, bounds)
+            multipliers(n, known, size, bounds.normal, bounds)
             if advance(size, bounds):
                 break
             known = _first_gone(size, bounds)

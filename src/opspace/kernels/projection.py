@@ -75,7 +75,7 @@ def nearest_acceleration(inertia, acceleration, bounds, distances):
     # Several times, what softness leaves of an excess included.
     for turn in range(CLEANINGS):
         while True:
-            project_on_bounds(count, n, bounds)
+            project_on_bounds(count, n, 0, bounds.normal, bounds)
             for a in range(n):
                 acceleration[a] = bounds.y[a]
             solve_lower_transposed(bounds.C, n, acceleration)
@@ -159,38 +159,40 @@ def _two_sided(count, n, owner, least, most, softness, bounds):
 
 
 @jit
-def project_on_bounds(count, n, bounds):
-    """Find y = x less the normals times their multipliers, none of which is negative.
+def project_on_bounds(count, n, held, way, bounds):
+    """Find y = x less the ways times their multipliers, none of which is negative.
 
     Args:
         count: Number of bounds.
         n: Size of x.
+        held: How many bounds held last, if only x is another one since; 0 to begin with none.
+        way: (count, n) where x goes for each bound; the normals themselves where near is ‖y − x‖.
         bounds: `BOUNDS`; x, normal, bound and softness are read, y and multiplier written.
+
+    Returns:
+        How many bounds hold.
     """
     for i in range(count):
         bounds.multiplier[i], bounds.scale[i] = 0.0, abs(bounds.bound[i])
         for a in range(n):
             bounds.scale[i] += abs(bounds.normal[i, a] * bounds.x[a])
-    for a in range(n):
-        bounds.y[a] = bounds.x[a]
-    size = 0
-    for _ in range(10 * count):
-        worst = _most_broken(count, n, bounds)
-        if worst < 0:
-            break
-        bounds.active[size] = worst
-        known, size = size, size + 1
+    known, size = held, held
+    for _ in range(10 * count + 1):
         while size > 0:
-            multipliers(n, known, size, bounds)
+            multipliers(n, known, size, way, bounds)
             if advance(size, bounds):
                 break
             known, size = _drop(size, bounds)
         for a in range(n):
             bounds.y[a] = bounds.x[a]
             for k in range(size):
-                bounds.y[a] -= (
-                    bounds.normal[bounds.active[k], a] * bounds.multiplier[bounds.active[k]]
-                )
+                bounds.y[a] -= way[bounds.active[k], a] * bounds.multiplier[bounds.active[k]]
+        worst = _most_broken(count, n, bounds)
+        if worst < 0:
+            break
+        bounds.active[size] = worst
+        known, size = size, size + 1
+    return size
 
 
 @jit
@@ -208,8 +210,8 @@ def _most_broken(count, n, bounds):
 
 
 @jit
-def multipliers(n, known, size, bounds):
-    """Solve (N Nᵀ + softness) λ = N x − bound for the bounds that hold, of which some are factored."""
+def multipliers(n, known, size, way, bounds):
+    """Solve (N wayᵀ + softness) λ = N x − bound for the bounds that hold, some of which are factored."""
     for k in range(size):
         i = bounds.active[k]
         bounds.r[k] = -bounds.bound[i]
@@ -221,7 +223,7 @@ def multipliers(n, known, size, bounds):
             j = bounds.active[b]
             product = 0.0
             for a in range(n):
-                product += bounds.normal[i, a] * bounds.normal[j, a]
+                product += bounds.normal[i, a] * way[j, a]
             bounds.G[k, b] = product
         bounds.G[k, k] += bounds.softness[i]
         cholesky_row(bounds.G, k, 0.0, bounds.factor)

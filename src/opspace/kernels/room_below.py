@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 
-from opspace.kernels.algebra import cholesky, solve_lower, solve_lower_transposed
 from opspace.kernels.compiled_scalars import level_weight
 from opspace.kernels.inertia import acceleration_of, unit_row, whitened_of
 from opspace.kernels.projection import project_on_bounds
@@ -30,7 +29,7 @@ def leave_room(work, stacks, n):
     bounds = work.bounds
     for a in range(2 * n):
         bounds.gave_way[a] = 0.0
-    if not _wants_more(work, n):
+    if not _over(work, work.joint_acceleration, BROKEN, n):
         return False
     whitened_of(work.inertia, work.joint_acceleration, bounds.z)
     end, below = work.slots.shape[0], work.rest[n] != 0.0
@@ -77,13 +76,13 @@ def _most(work, j, side):
 
 
 @jit
-def _wants_more(work, n):
-    x = work.joint_acceleration
+def _over(work, acceleration, tolerance, n):
+    """Whether a joint does more than what levels below others may use."""
     for j in range(n):
         for side in range(2):
             most = _most(work, j, side)
-            towards = x[j] if side == 0 else -x[j]
-            if towards - most > BROKEN * max(1.0, most):
+            towards = acceleration[j] if side == 0 else -acceleration[j]
+            if towards - most > tolerance * max(1.0, most):
                 return True
     return False
 
@@ -92,85 +91,125 @@ def _wants_more(work, n):
 def _leave_above(work, stacks, first, share, n):
     """Let what is wanted behind the first slots leave room; z is what all want together, √J/s."""
     bounds = work.bounds
-    if not _motions_left(work, stacks, first, n, False):
-        return
-    for a in range(n):
-        bounds.above[a] = bounds.z[a]
-        for b in range(n):
-            bounds.above[a] -= bounds.P[a, b] * bounds.z[b]
-    if not _motions_left(work, stacks, first, n, True) or not cholesky(bounds.P, n, 0.0, bounds.C):
-        return
-    count = _seen_rows(work, n)
     for a in range(n):
         bounds.x[a] = bounds.z[a]
-    solve_lower(bounds.C, n, bounds.x)
+        bounds.row[a] = bounds.z[a]
+    acceleration_of(work.inertia, bounds.row)
+    if not _over(work, bounds.row, 0.0, n):
+        return
+    _motions_left(work, stacks, first, n)
+    count = _seen_rows(work, n)
+    held = 0
     for _ in range(ROOM_CLEANINGS):
-        project_on_bounds(count, n, bounds)
+        held = project_on_bounds(count, n, held, bounds.way, bounds)
+        if held == 0:
+            break
         for a in range(n):
             bounds.x[a] = bounds.y[a]
         for i in range(count):
             bounds.gave_way[bounds.owner[i]] += share * bounds.multiplier[i] * bounds.size[i]
     for a in range(n):
-        left = bounds.x[a] / bounds.C[a, a]  # the factor's diagonal is inverted
-        for b in range(a):
-            left += bounds.C[a, b] * bounds.x[b]
-        bounds.z[a] += share * (left - bounds.z[a])
+        bounds.z[a] += share * (bounds.x[a] - bounds.z[a])
 
 
 @jit
-def _motions_left(work, stacks, first, n, weighed):
+def _motions_left(work, stacks, first, n):
     """P = Σ_T w_T (I + κ Σ Ĵᵀ Ĵ of the first slots + Σ ω Ĵᵀ Ĵ of the others)⁻¹, into bounds.P.
 
-    Returns:
-        Whether there are digits enough for it.
+    Without the others it is what the first slots do not see; what is left of z goes into bounds.above.
     """
-    P = work.bounds.P
+    bounds = work.bounds
+    P, UD = bounds.P, bounds.UD
     for a in range(n):
+        bounds.above[a] = bounds.z[a]
         for b in range(n):
             P[a, b] = 0.0
     for c in range(stacks):
-        _weigh(work, work.corner_on[c], first, n, weighed)
-        if not cholesky(work.bounds.W, n, 0.0, work.bounds.C):
-            return False
-        for a in range(n):
-            column = work.bounds.row
-            for b in range(n):
-                column[b] = 0.0
-            column[a] = 1.0
-            solve_lower(work.bounds.C, n, column)
-            solve_lower_transposed(work.bounds.C, n, column)
-            for b in range(n):
-                P[a, b] += work.corner_weight[c] * column[b]
-    return True
+        present, weight = work.corner_on[c], work.corner_weight[c]
+        _not_seen(work, present, first, n)
+        _take_unseen(bounds, weight, n)
+        _narrow_by_others(work, present, first, n)
+        for k in range(n):
+            factor = weight * UD[k, k]
+            for a in range(k):
+                for b in range(a + 1):
+                    P[a, b] += factor * UD[k, a] * UD[k, b]
+                P[k, a] += factor * UD[k, a]
+            P[k, k] += factor
+    for a in range(n):
+        for b in range(a):
+            P[b, a] = P[a, b]
 
 
 @jit
-def _weigh(work, present, first, n, weighed):
-    """W = I + κ Σ Ĵᵀ Ĵ of the first slots + Σ ω Ĵᵀ Ĵ of the others, of one stack."""
-    slots, W, Jw = work.slots, work.bounds.W, work.Jw
+def _not_seen(work, present, first, n):
+    """U D Uᵀ = (I + κ Σ Ĵᵀ Ĵ of the first slots)⁻¹ of one stack, into bounds.UD."""
+    UD = work.bounds.UD
     for a in range(n):
-        for b in range(n):
-            W[a, b] = 0.0
-        W[a, a] = 1.0
+        for b in range(a):
+            UD[a, b] = 0.0
+        UD[a, a] = 1.0
+    for s in range(first):
+        if present & slot_bit(s):
+            for row in range(work.slots[s, 1], work.slots[s, 1] + work.slots[s, 2]):
+                _narrow(work.Jw[row], UNSEEN, n, UD, work.bounds.row)
+
+
+@jit
+def _narrow_by_others(work, present, first, n):
+    """Count in Σ ω Ĵᵀ Ĵ of the slots of one stack that are not the first."""
+    slots = work.slots
     below, here = 0.0, 0.0
-    for s in range(slots.shape[0] - 1, -1, -1):
+    for s in range(slots.shape[0] - 1, first - 1, -1):
         if present & slot_bit(s):
             here = 1.0
-            factor = UNSEEN
-            if s >= first:
-                factor = level_weight(below) if weighed else 0.0
             for row in range(slots[s, 1], slots[s, 1] + slots[s, 2]):
-                for a in range(n):
-                    for b in range(n):
-                        W[a, b] += factor * Jw[row, a] * Jw[row, b]
+                _narrow(work.Jw[row], level_weight(below), n, work.bounds.UD, work.bounds.row)
         if s == 0 or slots[s - 1, 0] != slots[s, 0]:
             below += here
             here = 0.0
 
 
 @jit
+def _narrow(row, weight, n, UD, gain):
+    """Count a row in: U D Uᵀ becomes ((U D Uᵀ)⁻¹ + weight rowᵀ row)⁻¹.
+
+    Bierman's update of a covariance (Factorization Methods for Discrete Sequential Estimation, 1977,
+    chapter V): as exact as one of a root, at half the products.
+    """
+    total = 1.0 / weight
+    for j in range(n):
+        f = row[j]
+        for i in range(j):
+            f += UD[j, i] * row[i]
+        seen, before = UD[j, j] * f, total
+        total += f * seen
+        UD[j, j] *= before / total
+        factor = f / before
+        for i in range(j):
+            was = UD[j, i]
+            UD[j, i] = was - factor * gain[i]
+            gain[i] += seen * was
+        gain[j] = seen
+
+
+@jit
+def _take_unseen(bounds, weight, n):
+    """Take U D Uᵀ z, as far as a stack is there, from bounds.above."""
+    UD, z, above = bounds.UD, bounds.z, bounds.above
+    for k in range(n):
+        f = z[k]
+        for a in range(k):
+            f += UD[k, a] * z[a]
+        f *= weight * UD[k, k]
+        for a in range(k):
+            above[a] -= f * UD[k, a]
+        above[k] -= f
+
+
+@jit
 def _seen_rows(work, n):
-    """Write every limit as row · x <= bound, the row as far as levels behind the first slots move it.
+    """Write every limit as row · x <= bound, and the way of what is behind the first slots, P row.
 
     Returns:
         How many there are.
@@ -178,26 +217,45 @@ def _seen_rows(work, n):
     bounds = work.bounds
     count = 0
     for j in range(n):
+        if not min(_most(work, j, 0), _most(work, j, 1)) < UNBOUNDED:
+            continue
         unit_row(work.inertia, j, 1.0, bounds.row)
         size, above = 0.0, 0.0
         for a in range(n):
             size += bounds.row[a] * bounds.row[a]
             above += bounds.row[a] * bounds.above[a]
         size = math.sqrt(size)
+        seen = _way(bounds, size, n)
         for side in range(2):
             sign = 1.0 if side == 0 else -1.0
             most = _most(work, j, side)
             if not most < UNBOUNDED:
                 continue
-            seen = 0.0
             for a in range(n):
-                total = bounds.row[a] / bounds.C[a, a]
-                for b in range(a + 1, n):
-                    total += bounds.row[b] * bounds.C[b, a]
-                bounds.normal[count, a] = sign * total / size
-                seen += bounds.normal[count, a] * bounds.normal[count, a]
+                bounds.normal[count, a] = sign * bounds.row[a]
+                bounds.way[count, a] = sign * bounds.y[a]
             bounds.bound[count] = (most + max(sign * above, 0.0)) / size
             bounds.softness[count] = ROOM_SOFT
             bounds.owner[count], bounds.size[count] = j + side * n, seen * size
             count += 1
     return count
+
+
+@jit
+def _way(bounds, size, n):
+    """Give bounds.row unit length, and fill bounds.y (n,) with P row.
+
+    Returns:
+        row · P row.
+    """
+    P, row, y = bounds.P, bounds.row, bounds.y
+    seen = 0.0
+    for a in range(n):
+        row[a] /= size
+    for a in range(n):
+        along = 0.0
+        for b in range(n):
+            along += P[a, b] * row[b]
+        y[a] = along
+        seen += along * row[a]
+    return seen

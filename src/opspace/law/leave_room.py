@@ -74,17 +74,41 @@ def motions_left(stacks: Stacks, first: int, n: int, *, weighed: bool) -> Float[
     """
     P = np.zeros((n, n))
     for weight, present in stacks.corners:
-        W = np.eye(n)
+        S = np.eye(n)
         below = 0
         for place, level in reversed(list(enumerate(stacks.levels))):
             here = level.members & present
             factor = UNSEEN if place < first else level_weight(below) if weighed else 0.0
-            for k in sorted(here):
-                J = stacks.whitened[k].J
-                W += factor * (J.T @ J)
+            if factor > 0.0:
+                for row in (row for k in sorted(here) for row in stacks.whitened[k].J):
+                    S = narrowed(S, row, factor)
             below += bool(here)
-        P += weight * np.linalg.inv(W)
+        P += weight * S @ S.T
     return P
+
+
+def narrowed(
+    S: Float[np.ndarray, "n n"], row: Float[np.ndarray, " n"], weight: float
+) -> Float[np.ndarray, "n n"]:
+    """Count a row in, in a root of the inverse of what has been counted.
+
+        S Sᵀ = P   becomes   (P⁻¹ + w rowᵀ row)⁻¹,
+        S (I − f fᵀ / (‖f‖² + 1/w + √(1/w (‖f‖² + 1/w)))),   f = Sᵀ rowᵀ
+
+    A root has half as many digits to keep as P or its inverse, whose numbers differ w times.
+
+    Args:
+        S: (n, n) a root of P.
+        row: (n,) what is counted.
+        weight: w, above 0.
+
+    References:
+        Potter's update of the root of a covariance: Kaminski, Bryson and Schmidt, "Discrete square root
+        filtering: a survey of current techniques", IEEE Transactions on Automatic Control 16(6), 1971.
+    """
+    f = S.T @ row
+    total = f @ f + 1.0 / weight
+    return S - np.outer(S @ f, f) / (total + np.sqrt(total / weight))
 
 
 def wants_more(
@@ -127,8 +151,8 @@ def leave_room(
     and the same on the other side, as far as anything of level l is there: levels below l may use half
     of what a limit leaves, c = ½, and what those above do not use. At a limit, where nothing is left,
     the levels below press no longer, as far as they move the joint (`ROOM_SOFT`), and those above have
-    next to nothing to give way to at rest. Nothing changes unless `wants_more`, nor for a level whose
-    P_l is not positive definite in the digits there are: rows some 10⁵ times as large as others.
+    next to nothing to give way to at rest. Nothing changes unless `wants_more`. P_l has next to
+    nothing of what upper levels see; it is asked for products, never for its inverse.
 
     Args:
         L: (n, n) Cholesky factor of the inertia.
@@ -153,14 +177,12 @@ def leave_room(
     for first in range(len(stacks.levels) - (not stacks.damped), 0, -1):
         members = stacks.levels[first - 1].members
         share = sum(weight for weight, present in stacks.corners if present & members)
-        try:
-            above = x - motions_left(stacks, first, n, weighed=False) @ x
-            C = np.linalg.cholesky(motions_left(stacks, first, n, weighed=True))
-        except np.linalg.LinAlgError:
+        if not np.any(rows @ x > most):
             continue
-        z, bounds = np.linalg.solve(C, x), most + np.maximum(rows @ above, 0.0)
-        seen = rows @ C
-        z, multipliers = cleaned(z, seen, bounds, softness, ROOM_CLEANINGS)
-        taken[here] += share * multipliers * np.sum(seen**2, axis=1) * size
-        x = x + share * (C @ z - x)
+        above = x - motions_left(stacks, first, n, weighed=False) @ x
+        ways = rows @ motions_left(stacks, first, n, weighed=True)
+        bounds = most + np.maximum(rows @ above, 0.0)
+        y, multipliers = cleaned(x, rows, bounds, softness, ROOM_CLEANINGS, ways)
+        taken[here] += share * multipliers * np.sum(rows * ways, axis=1) * size
+        x = x + share * (y - x)
     return RoomLeft(np.linalg.solve(L.T, x), taken[:n], taken[n:])

@@ -81,23 +81,27 @@ def nearest_point(
     rows: Float[np.ndarray, "k n"],
     bounds: Float[np.ndarray, " k"],
     softness: Float[np.ndarray, " k"],
+    ways: Float[np.ndarray, "k n"] | None = None,
 ) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, " k"]]:
     """Find the point nearest to x with rows · y <= bounds.
 
-        min ‖y − x‖² + Σ excess²/softness
+        min (y − x)ᵀ P⁻¹ (y − x) + Σ excess²/softness
 
     with rows of unit length, or shorter ones, which are softer. The dual is a least-squares problem in
-    multipliers that are not negative; the answer is a continuous function of everything given.
+    multipliers that are not negative; the answer is a continuous function of everything given. It
+    asks for P times each row and not for its inverse, so a motion may be one that P has not.
 
     Args:
         x: (n,).
         rows: (k, n) of unit length or less.
         bounds: (k,) finite.
         softness: (k,) above 0.
+        ways: (k, n) rows P, P symmetric and not negative; None is the rows, P the identity.
 
     Returns:
-        The point, (n,), and the multipliers, (k,): it is x − rowsᵀ multipliers.
+        The point, (n,), and the multipliers, (k,): it is x − waysᵀ multipliers.
     """
+    ways = rows if ways is None else ways
     gap = rows @ x - bounds
     rounding = ROUNDING * (np.abs(bounds) + np.abs(rows) @ np.abs(x))
     y, multipliers, held = x, np.zeros(bounds.size), np.zeros(bounds.size, dtype=bool)
@@ -107,14 +111,14 @@ def nearest_point(
         if not np.any(broken):
             break
         held[np.argmax(np.where(broken, over, 0.0))] = True
-        while not _hold(rows, gap, softness, held, multipliers):
+        while not _hold(rows @ ways.T, gap, softness, held, multipliers):
             held &= multipliers > 0.0
-        y = x - rows.T @ multipliers
+        y = x - ways.T @ multipliers
     return y, multipliers
 
 
 def _hold(
-    rows: Float[np.ndarray, "k n"],
+    products: Float[np.ndarray, "k k"],
     gap: Float[np.ndarray, " k"],
     softness: Float[np.ndarray, " k"],
     held: Bool[np.ndarray, " k"],
@@ -125,8 +129,8 @@ def _hold(
     Returns:
         Whether they came all the way.
     """
-    N, now = rows[held], multipliers[held]
-    wanted = np.linalg.solve(N @ N.T + np.diag(softness[held]), gap[held])
+    G, now = products[np.ix_(held, held)], multipliers[held]
+    wanted = np.linalg.solve(G + np.diag(softness[held]), gap[held])
     falling = wanted <= 0.0
     if not np.any(falling):
         multipliers[held] = wanted
@@ -144,6 +148,7 @@ def cleaned(
     bounds: Float[np.ndarray, " k"],
     softness: Float[np.ndarray, " k"],
     turns: int,
+    ways: Float[np.ndarray, "k n"] | None = None,
 ) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, " k"]]:
     """Find `nearest_point` several times, each time from the last one.
 
@@ -153,6 +158,7 @@ def cleaned(
         bounds: (k,) finite.
         softness: (k,) above 0; that of distances is `hardened` on the way.
         turns: How many times.
+        ways: (k, n) where the point goes for each bound, see `nearest_point`.
 
     Returns:
         The point, (n,), and the sum of the multipliers, (k,).
@@ -161,7 +167,7 @@ def cleaned(
     for turn in range(turns):
         if turn == HANDOVERS and np.any(softness >= SOFT_APART):
             softness = np.array([hardened(one) for one in softness.tolist()])
-        x, multipliers = nearest_point(x, rows, bounds, softness)
+        x, multipliers = nearest_point(x, rows, bounds, softness, ways)
         total += multipliers
     return x, total
 

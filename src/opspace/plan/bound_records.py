@@ -23,10 +23,14 @@ BOUNDS = RecordTable(
     _work("W", ("n", "n"), "metric in x = Uᵀ q̈, see `opspace.law.task_metric`"),
     _work("C", ("n", "n"), "its lower Cholesky factor"),
     _work("P", ("n", "n"), "what levels leave to those below, see `opspace.law.motions_left`"),
+    _work(
+        "UD", ("n", "n"), "what one stack leaves, U D Uᵀ: Uᵀ without its diagonal of ones, and D"
+    ),
     _work("above", ("n",), "what levels with others below want", "√J/s"),
     _work("left", ("2 n",), "upper and lower as positions ask for them", "rad/s²", start=math.inf),
     _work("gave_way", ("2 n",), "what levels below give way to upper and lower", "rad/s²"),
     _work("normal", (_BOUNDS, "n"), "every bound as unit normal · z <= bound, in z = Cᵀ x"),
+    _work("way", ("2 n", "n"), "where what levels below move gives way to each bound"),
     _work("size", (_BOUNDS,), "length of each normal before"),
     _work(
         "owner",
