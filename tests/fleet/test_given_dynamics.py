@@ -18,6 +18,7 @@ def levels(robot):
         osc.JointLimits(),
         osc.PoseTask(target=target, name="pose"),
         osc.PositionTask(robot.frame_names[-2], target=[0.2, 0.1, 0.3], axes="z", name="elbow"),
+        osc.ImpedanceTask(robot.frame_names[-3], target=[0.2, 0.2, 0.2], name="spring"),
         osc.PostureTask(target=robot.q_reference),
     ]
 
@@ -26,6 +27,7 @@ def write(fleet, Q, V):
     """Be the simulator: write what it knows."""
     robot, rows = fleet.robot, {}
     frames = {"pose": robot.tool, "elbow": robot.frame_names[-2]}
+    frames["spring"] = robot.frame_names[-3]
     for q, v in zip(Q, V, strict=True):
         robot.update(q, v)
         rows.setdefault("M", []).append(robot.M.copy())

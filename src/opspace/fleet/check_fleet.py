@@ -6,7 +6,7 @@ from opspace.controller import Controller
 from opspace.errors import InputError, unknown_name
 from opspace.kernels.columns import MOMENTUM, OWN
 from opspace.plan.pack_task import kind_of
-from opspace.tasks import ForceTask, ImpedanceTask, Task, TrackingTask
+from opspace.tasks import ForceTask, Task, TrackingTask
 
 
 def check_robot(controller: Controller) -> None:
@@ -60,7 +60,7 @@ def check_task(task: Task, *, given: bool) -> TrackingTask:
         InputError: It cannot.
     """
     what = f"task {task.name!r} ({type(task).__name__})"
-    if isinstance(task, ForceTask | ImpedanceTask):
+    if isinstance(task, ForceTask):
         raise InputError(f"{what} needs a wrench; a fleet takes tasks of motion and of joints")
     if kind_of(task) == OWN or not isinstance(task, TrackingTask):
         raise InputError(f"{what} is evaluated in Python; a fleet takes the library's own tasks")

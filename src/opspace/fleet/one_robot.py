@@ -19,6 +19,7 @@ from opspace.kernels.columns import (
     REMEMBERS,
     ROWS,
     SOLVE,
+    SPRING,
     TURN,
 )
 from opspace.kernels.dynamics import evaluate
@@ -44,6 +45,8 @@ def robot_tick(work, robot):
     for i in range(work.kind.shape[0]):
         if work.kind[i, KIND] == MOTION:
             _take_motion(work, robot, i)
+            if work.kind[i, SPRING] != 0:
+                _take_spring(work, robot, i)
         elif work.kind[i, KIND] == JOINTS:
             _take_joints(work, robot, i)
     answer = tick(0.0, work)
@@ -126,6 +129,16 @@ def _take_motion(work, robot, i):
     if 2.0 * agreement * agreement - 1.0 < SAME_TARGET:
         work.kind[i, REMEMBERS] = 0
     before[0], before[1], before[2], before[3] = w, a, b, c
+
+
+def _take_spring(work, robot, i):
+    """Take over stiffness, damping and force of a task that is a spring."""
+    first, rows = work.kind[i, FIRST_ROW], work.kind[i, ROWS]
+    for row in range(first, first + rows):
+        stiffness = robot.stiffness[row]
+        work.spring[row, 0] = stiffness
+        work.spring[row, 1] = 2.0 * robot.damping_ratio[i] * math.sqrt(stiffness)
+        work.spring[row, 2] = robot.spring_force[row]
 
 
 def _take_joints(work, robot, i):

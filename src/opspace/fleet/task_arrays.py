@@ -20,9 +20,10 @@ from opspace.kernels.columns import (
     ORIENTATION,
     POSE,
     QUANTITY,
+    SPRING,
 )
 from opspace.machine.field_table import Record
-from opspace.tasks import TrackingTask
+from opspace.tasks import ImpedanceTask, TrackingTask
 from opspace.tasks.rotation import quaternion_from_matrix
 from opspace.tasks.validation import numbers
 
@@ -43,11 +44,15 @@ class TaskArrays:
         target: Position (3,), quaternion wxyz (4,), both (7,), or joint positions (m,).
         velocity: Its rate, (3,) or (6,) with the linear part first, or (m,); m/s, rad/s.
         acceleration: The rate of that, m/s², rad/s².
-        kp: (m,) stiffness of every row, 1/s².
-        kv: (m,) damping of every row, 1/s.
+        kp: (m,) stiffness of every row, 1/s²; of springs 0, and not looked at.
+        kv: (m,) damping of every row, 1/s; the same.
         activation: A factor of the task's presence in the stack, 0 to 1.
         error: (m,) x_d − x at the last step, m, rad.
         presence: h at the last step, activation included.
+        is_spring: Whether it has the three that follow: an `ImpedanceTask`.
+        stiffness: (m,) K, N/m, N·m/rad.
+        damping_ratio: ζ, 1 is critical.
+        force: (m,) force on the environment beside the spring's, N, N·m.
         told_motion: Whether it is told the three that follow: a task of motion in a fleet that is given
             the dynamics.
         pose: (7,) position and quaternion wxyz of what the task controls.
@@ -62,6 +67,7 @@ class TaskArrays:
         self._size = 0
         self._joints = False
         self.told_motion = False
+        self.is_spring = False
         self._start = 0
         self._wishes = np.full(count, task.target is None)
 
@@ -93,6 +99,12 @@ class TaskArrays:
             self._size = target.size
             velocity = number[GOAL_VELOCITY : GOAL_VELOCITY + size]
             acceleration = number[GOAL_ACCELERATION : GOAL_ACCELERATION + size]
+            if kind[SPRING]:
+                assert isinstance(self.task, ImpedanceTask)
+                self.is_spring = True
+                self.stiffness = self._filled(self.task.stiffness)
+                self.damping_ratio = self._filled(np.array(self.task.damping_ratio))
+                self.force = self._filled(self.task.force)
             if given:
                 self.told_motion = True
                 self.pose = self._filled(np.eye(7)[3])
@@ -156,8 +168,12 @@ class TaskArrays:
             robots: None for all, a mask, or their numbers.
 
         Raises:
-            InputError: A gain below 0, not finite or of another shape.
+            InputError: A gain below 0, not finite or of another shape, or a task that is a spring.
         """
+        if self.is_spring:
+            raise InputError(
+                f"task {self.name!r} is a spring and has no gains; write its stiffness and damping_ratio"
+            )
         mask = robots_of(robots, self._count)
         stiffness = self._checked(kp, self.kp, mask)
         critical = 2.0 * np.sqrt(np.maximum(stiffness, 0.0))
@@ -181,8 +197,13 @@ class TaskArrays:
         for name in ("pose", "jacobian", "drift") if self.told_motion else ():
             array = getattr(self, name)
             yield "in", array, f"(robot.{name}_().p + {i * int(np.prod(array.shape[1:]))})"
-        yield "in", self.kp, f"(work.kp_().p + {first})"
-        yield "in", self.kv, f"(work.kv_().p + {first})"
+        if self.is_spring:
+            yield "in", self.stiffness, f"(robot.stiffness_().p + {first})"
+            yield "in", self.force, f"(robot.spring_force_().p + {first})"
+            yield "in", self.damping_ratio, f"(robot.damping_ratio_().p + {i})"
+        else:
+            yield "in", self.kp, f"(work.kp_().p + {first})"
+            yield "in", self.kv, f"(work.kv_().p + {first})"
         yield "in", self.activation, f"(work.own_().p + {i})"
         yield "out", self.presence, f"(work.h_().p + {i})"
         yield "out", self.error, f"(work.error_().p + {first})"
