@@ -1,10 +1,9 @@
 """Shape annotations of the mathematics are checked at run time, under test only."""
 
 from hypothesis import HealthCheck, settings
-from jaxtyping import install_import_hook
 
-from tests import shapes
 from tests.another_python import ask_for
+from tests.shapes import check_annotations
 
 # The compiled form takes no annotations; it is tested against this one.
 READABLE = (
@@ -17,7 +16,7 @@ READABLE = (
     "torque",
     "tree",
 )
-install_import_hook([f"opspace.law.{name}" for name in READABLE], f"{shapes.__name__}.check")
+check_annotations([f"opspace.law.{name}" for name in READABLE])
 
 settings.register_profile(
     "search", deadline=None, suppress_health_check=[HealthCheck.too_slow], print_blob=True
