@@ -5,6 +5,9 @@ BIN := $(VENV)/bin
 INSTALLED := $(VENV)/.installed
 BENCH := .venv-bench
 
+# The tests start a few hundred interpreters, and half the time of a start is compiling the modules.
+export PYTHONDONTWRITEBYTECODE :=
+
 .PHONY: help test lint docs wheel test-package test-lowest test-slow test-search test-browser reproduce comparison bench constraints clean
 
 help:
@@ -38,7 +41,9 @@ docs: $(INSTALLED)
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
 	@echo "results: results/site/index.html"
 
-test: lint docs
+# Checks that use one core each run side by side.
+test: $(INSTALLED)
+	+$(MAKE) -j 2 lint docs
 	$(BIN)/python -m pytest -n 2
 
 # The wheel is made from the source distribution, its kernels by the compiler that the tests cover.
