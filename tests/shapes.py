@@ -72,10 +72,12 @@ def _answering(function, result):
 
 def form(value):
     """All that annotations can tell of a value: types, shapes, and which of the literal words."""
-    if isinstance(value, np.ndarray):
-        return type(value), value.dtype.char, value.shape
-    if isinstance(value, list | tuple):
-        return type(value), tuple(map(form, value))
-    if isinstance(value, set | frozenset):
-        return type(value), frozenset(map(form, value))
-    return value if isinstance(value, str) else type(value)
+    kind = type(value)
+    if kind is np.ndarray:
+        return value.dtype, value.shape
+    if kind is tuple or kind is list:
+        return kind, tuple(map(form, value))
+    if kind is frozenset or kind is set:
+        return kind, frozenset(map(form, value))
+    # Of a tuple with names an annotation says no more than which it is.
+    return value if kind is str else kind
