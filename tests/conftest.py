@@ -22,7 +22,7 @@ settings.register_profile(
     "search", deadline=None, suppress_health_check=[HealthCheck.too_slow], print_blob=True
 )
 # The same sources get the same answer; what nobody has drawn yet is for `make test-search`.
-settings.register_profile("gate", settings.get_profile("search"), derandomize=True)
+settings.register_profile("gate", settings.get_profile("search"), derandomize=True, max_examples=40)
 settings.load_profile("gate")
 
 
