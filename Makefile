@@ -5,6 +5,9 @@ BIN := $(VENV)/bin
 INSTALLED := $(VENV)/.installed
 BENCH := .venv-bench
 
+# The tests start a few hundred interpreters, and half the time of a start is compiling the modules.
+export PYTHONDONTWRITEBYTECODE :=
+
 .PHONY: help test lint docs wheel test-package test-lowest test-slow test-search test-browser reproduce comparison bench constraints clean
 
 help:
@@ -14,8 +17,8 @@ help:
 	@echo "make wheel       the source distribution and the wheel, with compiled kernels in it"
 	@echo "make test-package the default suite on the wheel, from the source distribution"
 	@echo "make test-lowest the default suite on the lowest versions that are allowed (PYTHON=python3.10)"
-	@echo "make test-slow   campaigns that take minutes"
-	@echo "make test-search the default suite with examples drawn anew, and ten times as many of the laws"
+	@echo "make test-slow   campaigns that take minutes, and pairs that the default suite leaves out"
+	@echo "make test-search the default suite with examples drawn anew, and twenty times as many of the laws"
 	@echo "make test-browser the viewer in headless Chromium, which must be installed"
 	@echo "make comparison  run other methods on the show-piece; rewrites the tables in the documents"
 	@echo "make bench       time the tick beside other controllers, in an environment of its own"
@@ -38,7 +41,9 @@ docs: $(INSTALLED)
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
 	@echo "results: results/site/index.html"
 
-test: lint docs
+# Checks that use one core each run side by side.
+test: $(INSTALLED)
+	+$(MAKE) -j 2 lint docs
 	$(BIN)/python -m pytest -n 2
 
 # The wheel is made from the source distribution, its kernels by the compiler that the tests cover.

@@ -1,5 +1,7 @@
 """The compiled tick against the readable one."""
 
+import functools
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -71,16 +73,28 @@ def assert_same_levels(ours, readable):
         )  # fmt: skip
 
 
+@functools.cache
+def loaded(name, backend):
+    return load_robot(name, backend=backend)
+
+
+def with_robots(values, robots=ROBOTS):
+    """Every value with some robot and every robot with some value; the other pairs are slow."""
+    return [
+        pytest.param(robot, value, id=f"{'-'.join(robot)}-{value}", marks=[pytest.mark.slow] * odd)
+        for i, robot in enumerate(robots)
+        for k, value in enumerate(values)
+        for odd in [(i + k) % 2]
+    ]
+
+
 class Twins:
     """The same stack twice, run by either form on a robot of its own."""
 
     def __init__(self, robot, make, **options):
-        name, backend = robot
         self.stacks = [Stack(make()), Stack(make())]
-        self.ours = Controller(load_robot(name, backend=backend), self.stacks[0], **options)
-        self.readable = ReferenceController(
-            load_robot(name, backend=backend), self.stacks[1], **options
-        )
+        self.ours = Controller(loaded(*robot).fresh(), self.stacks[0], **options)
+        self.readable = ReferenceController(loaded(*robot).fresh(), self.stacks[1], **options)
         self.robot = self.ours.robot
 
     def step(self, t, q, v, levels=True):
@@ -156,9 +170,8 @@ KINDS = {
 }
 
 
-@pytest.mark.parametrize("robot", ROBOTS, ids="-".join)
+@pytest.mark.parametrize(("robot", "posture"), with_robots([True, False]))
 @pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize("posture", [True, False])
 def test_every_kind_of_task(robot, kind, posture):
     twins = Twins(robot, lambda: [JointLimits(), *KINDS[kind](robot), *([PostureTask()] * posture)])
     rng = np.random.default_rng(1)
@@ -177,9 +190,8 @@ OPTIONS = {
 }
 
 
-@pytest.mark.parametrize("robot", ROBOTS, ids="-".join)
+@pytest.mark.parametrize(("robot", "mode"), with_robots(["admissible", "buffer"]))
 @pytest.mark.parametrize("option", OPTIONS)
-@pytest.mark.parametrize("mode", ["admissible", "buffer"])
 def test_every_option(robot, option, mode):
     def make():
         height = PositionTask(axes="z", name="height", target=[0, 0, 0.2])
@@ -371,8 +383,7 @@ def test_a_rotation_past_half_a_turn_keeps_its_way():
     assert largest > np.pi + 0.2
 
 
-@pytest.mark.parametrize("robot", ROBOTS[:2], ids="-".join)
-@pytest.mark.parametrize("max_speed", [None, 1.0])
+@pytest.mark.parametrize(("robot", "max_speed"), with_robots([None, 1.0], ROBOTS[:2]))
 def test_no_angle_makes_a_step(robot, max_speed):
     """Two turns of the first joint away from the target: ten times finer, steps of a tenth."""
     largest = []

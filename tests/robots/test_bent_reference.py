@@ -41,12 +41,23 @@ def left_over(robot: AdapterBase, way: np.ndarray) -> float:
 
 
 @pytest.mark.parametrize("axes", STRETCHED.values(), ids=STRETCHED)
-def test_a_stretched_arm_is_bent_and_goes_where_it_is_told(tmp_path: Path, axes: str) -> None:
+def test_a_stretched_arm_is_bent_a_little(tmp_path: Path, axes: str) -> None:
     robot = loaded(tmp_path, axes)
     bent = np.flatnonzero(robot.q_reference)
     assert 1 <= len(bent) <= 2
     assert np.all(np.abs(robot.q_reference) <= 1.5)
     assert not any("keep an error" in words for words in check_robot(robot).warnings)
+
+
+@pytest.mark.parametrize(
+    "axes",
+    [
+        pytest.param(axes, id=name, marks=[pytest.mark.slow] * (k > 1))
+        for k, (name, axes) in enumerate(STRETCHED.items())
+    ],
+)
+def test_a_bent_arm_goes_where_it_is_told(tmp_path: Path, axes: str) -> None:
+    robot = loaded(tmp_path, axes)
     for k in range(3):
         for sign in (WAY, -WAY):
             assert left_over(robot, sign * np.eye(3)[k]) < 1e-3

@@ -1,6 +1,7 @@
 """Whatever a file says: a scenario, a robot, or an error of the library that names what is wrong."""
 
 import copy
+import functools
 import random
 
 import numpy as np
@@ -16,10 +17,6 @@ from opspace.scenario.load import load_scenario, scenario_from, shipped_scenario
 from tests.budget import examples
 
 SEEDS = st.integers(0, 2**32 - 1)
-TEXT = {
-    name: yaml.safe_dump(to_dict(load_scenario(name)), sort_keys=False)
-    for name in shipped_scenarios()
-}
 ODD = [
     None, True, -1, 0, 1e308, -1e308, 1e-320, float("nan"), float("inf"), "", "x", "puma560", "~",
     [], {}, [None], [1.0, 2.0, 3.0], {"a": 1}, [[1]], 10**30, "tool", "1", {"type": "hold"},
@@ -105,6 +102,11 @@ def mutated(data, rng):
     return data
 
 
+@functools.cache
+def text_of(name):
+    return yaml.safe_dump(to_dict(load_scenario(name)), sort_keys=False)
+
+
 def damaged(text, rng):
     """Cut, double or overwrite pieces of a text."""
     for _ in range(rng.randint(1, 4)):
@@ -119,7 +121,7 @@ def damaged(text, rng):
 @examples(50)
 def test_a_scenario_with_odd_values_is_one_or_is_refused(seed):
     rng = random.Random(seed)
-    data = mutated(yaml.safe_load(rng.choice(list(TEXT.values()))), rng)
+    data = mutated(yaml.safe_load(text_of(rng.choice(list(shipped_scenarios())))), rng)
     try:
         scenario = scenario_from(data)
     except OpspaceError as error:
@@ -141,7 +143,7 @@ def test_a_scenario_with_odd_values_is_one_or_is_refused(seed):
 def test_a_damaged_scenario_file_is_one_or_is_refused(tmp_path_factory, seed):
     rng = random.Random(seed)
     path = tmp_path_factory.mktemp("fuzz") / "scenario.yaml"
-    text = damaged(rng.choice(list(TEXT.values())), rng)
+    text = damaged(text_of(rng.choice(list(shipped_scenarios()))), rng)
     path.write_bytes(text.encode() if rng.random() < 0.9 else text.encode("utf-16"))
     try:
         load_scenario(path)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import islice
 
 import numpy as np
 
@@ -10,7 +12,7 @@ from opspace.errors import ModelError
 from opspace.robots.motor_range import motor_range
 from opspace.robots.protocol import Robot
 from opspace.robots.sampled_postures import sample_postures
-from opspace.tasks import Task
+from opspace.tasks import PostureTask, Task
 from opspace.tasks.motion_task import MotionTask
 
 UNKNOWN_BRAKE = 20.0
@@ -54,20 +56,25 @@ class Workspace:
 
     def __init__(self, robot: Robot) -> None:
         self._robot = robot = robot.fresh()
-        self._visited: list[tuple[np.ndarray, np.ndarray]] = []
-        brake = np.full(robot.nv, np.inf)
-        joint_sigma, motors = np.inf, motor_range(robot)
-        robot.update(robot.q_reference, np.zeros(robot.nv))
-        _checked_inertia(robot)
-        for q in sample_postures(robot):
-            robot.update(q, np.zeros(robot.nv))
-            inverse = np.linalg.inv(_checked_inertia(robot))
-            joint_sigma = min(joint_sigma, float(np.linalg.eigvalsh(inverse)[0]))
-            spare = np.maximum(motors.limit - np.abs(robot.bias - motors.middle), 0.0)  # at rest
-            brake = np.minimum(brake, 0.5 * spare * np.diag(inverse))
-            self._visited.append((q, inverse))
+        self._still = np.zeros(robot.nv)
+        motors = motor_range(robot)
+        robot.update(robot.q_reference, self._still)
+        _check_inertias(robot, robot.M[np.newaxis])
+        self._postures = list(sample_postures(robot))
+        visited = [(robot.M.copy(), robot.bias.copy()) for _ in self._visit()]
+        inertias, at_rest = (np.array(part) for part in zip(*visited, strict=True))
+        _check_inertias(robot, inertias)
+        self._inverses = np.linalg.inv(inertias)
+        self.joint_sigma = float(np.linalg.eigvalsh(self._inverses)[:, 0].min())
+        spare = np.maximum(motors.limit - np.abs(at_rest - motors.middle), 0.0)
+        brake = np.min(0.5 * spare * np.diagonal(self._inverses, axis1=1, axis2=2), axis=0)
         self.brake = np.where(np.isfinite(brake), np.clip(brake, *BRAKE_RANGE), UNKNOWN_BRAKE)
-        self.joint_sigma = joint_sigma
+
+    def _visit(self) -> Iterator[Robot]:
+        """Take the copy of the robot through all postures, at rest."""
+        for q in self._postures:
+            self._robot.update(q, self._still)
+            yield self._robot
 
     def reference(self, task: Task) -> np.ndarray:
         """Take the scale of a task's rows: what is usual for their smallest eigenvalue σ.
@@ -84,42 +91,42 @@ class Workspace:
         Returns:
             (m,) references, 1/kg or 1/(kg·m²).
         """
-        robot = self._robot
-        task.bind(robot)
-        alone: list[np.ndarray] = []
-        held: list[float] = []
-        everything: list[np.ndarray] = []
+        task.bind(self._robot)
         angular = np.array(task.units) == "rad"
-        for q, inverse in self._visited:
-            robot.update(q, np.zeros(robot.nv))
-            J = task.evaluate(robot, 0.0).J
-            everything.append(J @ inverse @ J.T)
-            alone.append(_smallest_per_unit(task, everything[-1]))
-            if isinstance(task, MotionTask) and angular.any():
-                origin = task.source.measure(robot).J[:3]
-                held.append(_smallest_while_held(J[angular], origin, inverse))
-        reference = np.median(alone, axis=0)
-        if held and np.median(held) > STRUCTURAL * reference[angular][0]:
-            reference[angular] = np.minimum(reference[angular], 2.0 * np.median(held))
+        below_origin = isinstance(task, MotionTask) and angular.any()
+        jacobians: list[np.ndarray] = []
+        origins: list[np.ndarray] = []
+        # Joints are the same rows in every posture.
+        for robot in islice(self._visit(), 1 if isinstance(task, PostureTask) else None):
+            jacobians.append(task.evaluate(robot, 0.0).J)
+            if isinstance(task, MotionTask) and below_origin:
+                origins.append(task.source.measure(robot).J[:3])
+        J = np.array(jacobians)
+        everything = J @ self._inverses @ J.mT
+        reference = np.median(_smallest_per_unit(task, everything), axis=0)
+        if below_origin:
+            held = np.median(_smallest_while_held(J[:, angular], np.array(origins), self._inverses))
+            if held > STRUCTURAL * reference[angular][0]:
+                reference[angular] = np.minimum(reference[angular], 2.0 * held)
         weight = np.sqrt(np.outer(reference, reference))
         # A frame that nothing moves has no scale.
         if angular.any() and not angular.all() and np.all(weight > 0.0):
-            together = np.median([np.linalg.eigvalsh(S / weight)[0] for S in everything])
+            together = np.median(np.linalg.eigvalsh(everything / weight)[:, 0])
             if together > STRUCTURAL:
                 reference = reference * together
         return reference
 
 
-def _checked_inertia(robot: Robot) -> np.ndarray:
-    """The inertia, which every joint must have some of that the ones before it do not move alike."""
-    M = robot.M
-    if not np.all(np.isfinite(M)):
+def _check_inertias(robot: Robot, inertias: np.ndarray) -> None:
+    """Refuse a joint that has no inertia but what the ones before it move alike, in any posture."""
+    if not np.all(np.isfinite(inertias)):
         raise _no_inertia(robot, "check the masses")
+    diagonals = np.diagonal(inertias, axis1=1, axis2=2)
     try:
-        own = np.linalg.cholesky(M).diagonal() ** 2
+        own = np.diagonal(np.linalg.cholesky(inertias), axis1=1, axis2=2) ** 2
     except np.linalg.LinAlgError:
-        own = _own_inertia(M)
-    still = own <= MASSLESS * max(float(M.diagonal().max()), 0.0)
+        own = np.array([_own_inertia(M) for M in inertias])
+    still = np.any(own <= MASSLESS * np.maximum(diagonals.max(axis=1), 0.0)[:, np.newaxis], axis=0)
     if np.any(still):
         names = [joint for joint, s in zip(robot.joint_names, still, strict=True) if s]
         raise _no_inertia(
@@ -127,7 +134,6 @@ def _checked_inertia(robot: Robot) -> np.ndarray:
             f"joint {', '.join(map(repr, names))} moves no mass of its own: give the links a mass and "
             "an inertia (<inertial> in a URDF), or hold the joint (locked=)",
         )
-    return M
 
 
 def _own_inertia(M: np.ndarray) -> np.ndarray:
@@ -142,25 +148,27 @@ def _no_inertia(robot: Robot, why: str) -> ModelError:
     return ModelError(f"robot {robot.name!r}: its inertia is not positive definite; {why}")
 
 
-def _smallest_per_unit(task: Task, inverse_inertia: np.ndarray) -> np.ndarray:
-    """Smallest eigenvalue of the block of J A⁻¹ Jᵀ that each row shares a unit with, (m,).
+def _smallest_per_unit(task: Task, inverse_inertias: np.ndarray) -> np.ndarray:
+    """Smallest eigenvalue of the block of J A⁻¹ Jᵀ that each row shares a unit with, (postures, m).
 
     A direction that the arm does not have in any posture is nothing that it could lose.
     """
     units = np.array(task.units)
-    result = np.zeros(task.rows)
+    result = np.zeros((len(inverse_inertias), task.rows))
     for unit in set(task.units):
-        rows = units == unit
-        sigma = np.linalg.eigvalsh(inverse_inertia[np.ix_(rows, rows)])
-        there = sigma[sigma > STRUCTURAL * sigma[-1]]
-        result[rows] = there[0] if there.size else np.finfo(float).tiny
+        rows = np.flatnonzero(units == unit)
+        sigma = np.linalg.eigvalsh(inverse_inertias[:, rows[:, np.newaxis], rows])
+        there = np.where(sigma > STRUCTURAL * sigma[:, -1:], sigma, np.inf).min(axis=1)
+        result[:, rows] = np.where(np.isfinite(there), there, np.finfo(float).tiny)[:, np.newaxis]
     return result
 
 
-def _smallest_while_held(J: np.ndarray, held: np.ndarray, inverse: np.ndarray) -> float:
-    """Smallest eigenvalue of J A⁻¹ Nᵀ Jᵀ in the motions that leave the rows ``held`` alone."""
-    basis = np.linalg.cholesky(inverse)
+def _smallest_while_held(J: np.ndarray, held: np.ndarray, inverses: np.ndarray) -> np.ndarray:
+    """Smallest eigenvalues of J A⁻¹ Nᵀ Jᵀ in the motions that leave the rows ``held`` alone."""
+    basis = np.linalg.cholesky(inverses)
     _, s, Vt = np.linalg.svd(held @ basis)
-    free = Vt[int(np.sum(s > 1e-9 * s[0])) :]
-    projected = J @ basis @ free.T
-    return float(np.linalg.eigvalsh(projected @ projected.T)[0])
+    beyond = (
+        np.arange(Vt.shape[-1])[np.newaxis] >= np.sum(s > 1e-9 * s[:, :1], axis=1)[:, np.newaxis]
+    )
+    projected = J @ basis @ (Vt * beyond[:, :, np.newaxis]).mT
+    return np.linalg.eigvalsh(projected @ projected.mT)[:, 0]
