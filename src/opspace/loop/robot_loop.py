@@ -13,7 +13,7 @@ from opspace.command import Status
 from opspace.controller import ReferenceController
 from opspace.controller.handover import Handover
 from opspace.controller.watchdog import JUMP, MISSED
-from opspace.errors import InputError, OpspaceError
+from opspace.errors import InputError, OpspaceError, RobotStoppedError
 from opspace.kernels.cycle_columns import FROZEN, JUMPED, OVER, SILENT
 from opspace.kernels.cycle_columns import STOPPED as STOPPED_BY_STATUS
 from opspace.loop.declared import HoldCheck, check_declared
@@ -349,8 +349,8 @@ class Loop:
         """Let the controller have the robot, and brake it."""
         try:
             self._control()
-        except _NoStateError:
-            # Without a state nothing brakes that does not know it itself.
+        except (_NoStateError, RobotStoppedError):
+            # Without a state nothing brakes that does not know it itself; who has stopped is not asked.
             raise
         except Exception as error:
             self._fail(error)

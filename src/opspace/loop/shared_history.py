@@ -31,11 +31,13 @@ class SharedHistory(History):
     """A ring of cycles in a file, best one of ``/dev/shm``, that another process can follow.
 
     What a cycle leaves there is there when the process of the loop is killed in the next moment, also
-    where cycles are compiled. `opspace.LoopRecorder` writes it down. Words of 8 bytes: `MAGIC`, nq, n,
-    rows, the end (0 not yet, 1 completed, 2 stopped, 3 crashed), `WHOLES` whole numbers of the loop, the
-    fourth of which counts the cycles; from the 25th the reason of the end; from the 65th the rows, t, q, v,
-    tau, status and the time to the answer of each as doubles. Cycle k is in row k modulo their number.
-    While the loop's process lives, it holds a lock (``flock``) on the file.
+    where cycles are compiled. `opspace.LoopRecorder` writes it down.
+
+    Words of 8 bytes: `MAGIC`, nq, n, rows, the end (0 not yet, 1 completed, 2 stopped, 3 crashed), ten
+    whole numbers of the loop, the fourth of which counts the cycles; from the 25th the reason of the
+    end in UTF-8; from the 65th the rows, t, q, v, tau, status and the time to the answer of each as
+    doubles. Cycle k is in row k modulo their number. While the loop's process lives, it holds a lock
+    (``flock``) on the file.
 
     Args:
         path: The file; one that another loop has left is replaced.
@@ -43,7 +45,8 @@ class SharedHistory(History):
         rows: How many cycles are remembered.
 
     Raises:
-        InputError: The file is something else or a loop's that goes on, or there is no cycle to remember.
+        InputError: The file is something else or a loop's that goes on, or there is no cycle to
+            remember.
         OSError: It cannot be written.
     """
 

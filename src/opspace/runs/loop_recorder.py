@@ -38,10 +38,10 @@ DYING = 0.02
 class LoopRecorder:
     """Has a process of its own write the cycles of a loop into a recording.
 
-    The process looks into the loop's `SharedHistory` every 2 ms, so the loop waits for nothing, also where
-    its cycles are compiled. Whoever is killed, what was looked at is on the disk: the process of the
-    loop, and the recording ends with its last cycle but one and says ``crashed``; this one, and the loop
-    goes on without it. Use it around the loop::
+    The process looks into the loop's `SharedHistory` every 2 ms, so the loop waits for nothing, also
+    where its cycles are compiled. Whoever is killed, what was looked at is on the disk: the process of
+    the loop, and the recording ends with its last cycle but one and says ``crashed``; this one, and the
+    loop goes on without it. Use it around the loop::
 
         history = osc.SharedHistory("/dev/shm/arm-cycles", robot)
         loop = osc.Loop(controller, driver, history=history)
