@@ -20,19 +20,19 @@ class Client:
         self.q, self.cycles, self.time, self.calls = q, cycles, 0.0, []
         self.last = np.zeros(q.size)
 
-    def Robot(self, host, config):  # noqa: N802 - as there
+    def Robot(self, host, config):
         return self
 
     def start_torque_control(self):
         return self
 
-    def Torques(self, tau):  # noqa: N802
+    def Torques(self, tau):
         return SimpleNamespace(tau=tau)
 
     def stop(self):
         self.calls.append("stop")
 
-    def readOnce(self):  # noqa: N802
+    def readOnce(self):
         self.calls.append("read")
         self.time += 1e-3
         if self.time > 1e-3 * self.cycles:
@@ -47,7 +47,7 @@ class Client:
         )
         return state, None
 
-    def writeOnce(self, torques):  # noqa: N802
+    def writeOnce(self, torques):
         self.calls.append("write")
         assert self.calls.count("reflex") == 0, "the client waits for ever"
         self.last = np.array(torques.tau)
