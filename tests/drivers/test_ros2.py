@@ -19,9 +19,9 @@ class Arm:
     """A PUMA 560 that tells its joints in another order, waits for each command, and adds gravity."""
 
     def __init__(self):
-        from rclpy.executors import SingleThreadedExecutor  # noqa: PLC0415
-        from sensor_msgs.msg import JointState  # noqa: PLC0415
-        from std_msgs.msg import Float64MultiArray  # noqa: PLC0415
+        from rclpy.executors import SingleThreadedExecutor
+        from sensor_msgs.msg import JointState
+        from std_msgs.msg import Float64MultiArray
 
         self.robot = osc.load_robot("puma560")
         self.plant = osc.Plant(self.robot, self.robot.q_reference, dt=2e-3, adds_gravity=True)
@@ -69,15 +69,13 @@ class Arm:
 
 
 def test_an_arm_behind_topics_goes_to_its_target():
-    from opspace.drivers.ros2 import Ros2Driver  # noqa: PLC0415
+    from opspace.drivers.ros2 import Ros2Driver
 
     with Arm() as arm:
         robot = osc.load_robot("puma560")
         hand = osc.PositionTask(kp=50.0, max_speed=0.25, max_acceleration=1.0)
         stack = osc.Stack([hand, osc.PostureTask(kp=16.0)])
-        controller = osc.Controller(
-            robot, stack, gravity="robot", period=2e-3, on_time_jump="hold"
-        )
+        controller = osc.Controller(robot, stack, gravity="robot", period=2e-3, on_time_jump="hold")
         driver = Ros2Driver(robot.joint_names, facts=FACTS)
         loop = osc.Loop(controller, driver, patience=3000, handover=0.1)
         with loop:
@@ -92,7 +90,7 @@ def test_an_arm_behind_topics_goes_to_its_target():
 
 
 def test_what_the_states_lack_is_named():
-    from opspace.drivers.ros2 import Ros2Driver  # noqa: PLC0415
+    from opspace.drivers.ros2 import Ros2Driver
 
     with pytest.raises(osc.InputError, match="named once"):
         Ros2Driver(["a", "a"], facts=FACTS)
