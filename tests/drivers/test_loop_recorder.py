@@ -94,6 +94,7 @@ def test_a_file_of_somebody_else_is_refused(tmp_path):
     osc.LoopRecorder(history, controller, tmp_path / "run").close()
     with pytest.raises(RecordingError, match="already holds a recording"):
         osc.LoopRecorder(history, controller, tmp_path / "run")
+    assert osc.load(tmp_path / "run").ended.reason == "nobody wanted more of it"
     history.close()
 
 

@@ -81,7 +81,7 @@ class SharedHistory(History):
         os.close(self._file)
 
 
-class Followed(NamedTuple):
+class AddedCycles(NamedTuple):
     """What has been added to a history since the last look.
 
     Attributes:
@@ -128,7 +128,7 @@ class HistoryFollower:
             return ENDS[code], reason.decode(errors="ignore")
         return ("crashed", GONE) if _free(self._file) else None
 
-    def more(self, *, ended: bool) -> Followed:
+    def more(self, *, ended: bool) -> AddedCycles:
         """Copy what has been added.
 
         Args:
@@ -144,7 +144,7 @@ class HistoryFollower:
         torn = min(max(0, now - size + 1 - first), len(rows)) if not ended else 0
         lost = max(0, first - self.seen) + torn
         self.seen = max(self.seen, last)
-        return Followed(rows[torn:], lost)
+        return AddedCycles(rows[torn:], lost)
 
     def close(self) -> None:
         """Look at it no more."""

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import subprocess
 import sys
-import time
 from collections.abc import Mapping
 from dataclasses import astuple
 from pathlib import Path
@@ -31,8 +31,7 @@ STARTING = 60.0
 ENDING = 10.0
 """How long it may take to write down the rest, s."""
 READY = "ready"
-DYING = 0.02
-"""Time in which the system takes everything back from a process that is gone, s."""
+ENOUGH = "enough"
 
 
 class LoopRecorder:
@@ -114,6 +113,10 @@ class LoopRecorder:
             )
 
     def _let_go(self) -> None:
+        with contextlib.suppress(OSError, ValueError):  # it is gone, or was let go before
+            assert self._process.stdin is not None
+            self._process.stdin.write(ENOUGH)
+            self._process.stdin.flush()
         for stream in (self._process.stdin, self._process.stdout):
             if stream is not None:
                 stream.close()
@@ -131,22 +134,38 @@ class LoopRecorder:
         self.close()
 
 
-def follow(history: HistoryFollower, recorder: Recorder, stop: Event) -> None:
+class _Owner:
+    """Whoever began this process, in the other of its pipes."""
+
+    def __init__(self) -> None:
+        self._silent, self._word = Event(), ""
+        Thread(target=self._listen, daemon=True).start()
+
+    def _listen(self) -> None:
+        self._word = sys.stdin.read()
+        self._silent.set()
+
+    def end(self, seconds: float) -> tuple[str, str] | None:
+        """Wait so long; tell how it ends if he has let this go, or is gone without a word."""
+        if not self._silent.wait(seconds):
+            return None
+        return ("stopped", "nobody wanted more of it") if self._word else ("crashed", GONE)
+
+
+def follow(history: HistoryFollower, recorder: Recorder, owner: _Owner) -> None:
     """Write cycles down until the loop has ended, or nobody wants more of them."""
     lost = 0
     while True:
-        wanted = stop.wait(LOOK)
-        if wanted:
-            time.sleep(DYING)
-        end = history.end
+        let_go = owner.end(LOOK)
+        end = history.end or let_go
         killed = end == ("crashed", GONE)
-        found = history.more(ended=end is not None and not killed)
+        found = history.more(ended=end is not None and not killed and end is not let_go)
         lost += found.lost
         if len(found.rows):
             recorder.extend(found.rows)
-        if end is not None or wanted:
+        if end is not None:
             break
-    how, reason = end if end is not None else ("stopped", "nobody wanted more of it")
+    how, reason = end
     if lost:
         reason = f"{reason}; {lost} cycles were overwritten before they were read".lstrip("; ")
     recorder.close(_ended(how), reason)
@@ -156,15 +175,9 @@ def _ended(how: str) -> Ended:
     return "completed" if how == "completed" else "stopped" if how == "stopped" else "crashed"
 
 
-def _listen(stop: Event) -> None:
-    """Wait until whoever began this lets it go, or is gone."""
-    sys.stdin.read()
-    stop.set()
-
-
 def main() -> None:
     """Be that process: what to do comes from the standard input."""
-    told, stop = json.loads(sys.stdin.readline()), Event()
+    told = json.loads(sys.stdin.readline())
     try:
         history = HistoryFollower(told["path"])
         columns = [Column(*column) for column in told["columns"]]
@@ -175,9 +188,8 @@ def main() -> None:
         print(error, flush=True)
         sys.exit(2)
     print(READY, flush=True)
-    Thread(target=_listen, args=(stop,), daemon=True).start()
     with recorder:
-        follow(history, recorder, stop)
+        follow(history, recorder, _Owner())
 
 
 if __name__ == "__main__":
