@@ -354,11 +354,51 @@ def test_the_page_of_the_library_is_right(tmp_path):
     page = DOCS / "how-to" / "c-library.md"
     done = run_blocks(programs_of(page), tmp_path)
     assert done.returncode == 0, done.stderr
-    (line,) = (one for one in commands_of(page) if one.startswith("cc "))
+    (line,) = (one for one in commands_of(page) if one.startswith("cc ") and "main.c" in one)
     words = [CC, *STRICT, *line.split()[1:]]
     subprocess.run(" ".join(words), cwd=tmp_path, check=True, shell=True)
     done = subprocess.run([tmp_path / "hold"], capture_output=True, text=True, check=True)
     assert done.stdout == "guest: 1\n"
+
+
+FRANKA = """
+#pragma once
+#include <array>
+#include <functional>
+#include <string>
+namespace franka {
+struct Duration { double toSec() const { return 0.0; } };
+struct RobotState {
+    std::array<double, 7> q, dq, tau_J_d;
+    Duration time;
+};
+struct Torques {
+    Torques(const std::array<double, 7> &tau) : tau_J(tau) {}
+    std::array<double, 7> tau_J;
+};
+inline Torques MotionFinished(Torques last) { return last; }
+constexpr double kMaxCutoffFrequency = 1000.0;
+struct Robot {
+    Robot(const std::string &) {}
+    void control(std::function<Torques(const RobotState &, Duration)>, bool, double) {}
+};
+}
+"""
+
+
+@with_cc
+@pytest.mark.skipif(shutil.which("c++") is None, reason="no C++ compiler is installed (c++)")
+def test_the_callback_of_the_page_is_a_program(tmp_path):
+    """Against a stand-in of libfranka's header, whose names are those of the real one."""
+    controller, _ = start()
+    export_c(controller, tmp_path)
+    (tmp_path / "franka").mkdir()
+    (tmp_path / "franka" / "robot.h").write_text(FRANKA)
+    page = (DOCS / "how-to" / "c-library.md").read_text(encoding="utf-8")
+    program = page.split('```cpp title="franka.cpp"\n')[1].split("```")[0]
+    (tmp_path / "franka.cpp").write_text(program)
+    words = ["c++", "-std=c++17", "-Wall", "-Wextra", "-Werror", "-I.", "-fsyntax-only"]
+    subprocess.run([*words, "franka.cpp"], cwd=tmp_path, check=True)
 
 
 @with_cc
