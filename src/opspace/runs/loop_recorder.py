@@ -113,13 +113,14 @@ class LoopRecorder:
             )
 
     def _let_go(self) -> None:
-        with contextlib.suppress(OSError, ValueError):  # it is gone, or was let go before
-            assert self._process.stdin is not None
-            self._process.stdin.write(ENOUGH)
-            self._process.stdin.flush()
-        for stream in (self._process.stdin, self._process.stdout):
-            if stream is not None:
-                stream.close()
+        stdin, stdout = self._process.stdin, self._process.stdout
+        assert stdin is not None
+        assert stdout is not None
+        with contextlib.suppress(BrokenPipeError):  # it may be gone
+            if not stdin.closed:
+                stdin.write(ENOUGH)
+            stdin.close()
+        stdout.close()
         self._process.wait(ENDING)
 
     def __enter__(self) -> Self:
