@@ -5,6 +5,7 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import contextmanager
 
 import pytest
 
@@ -37,10 +38,15 @@ while True:
 """
 
 
+@contextmanager
 def with_a_driver_apart(folder, port):
     """A driver in a process of its own: UDP towards the robot, shared memory towards the loop."""
     command = [sys.executable, "-c", BRIDGE, str(folder / "driver"), port]
-    return subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as driver:
+        try:
+            yield driver
+        finally:
+            driver.kill()
 
 
 def kill_a_driver(folder):
@@ -50,14 +56,14 @@ def kill_a_driver(folder):
             assert driver.stdout.readline() == "there\n"
             controller, _ = arm()
             memory = SharedMemoryDriver(folder / "driver", nq=N, n=N, facts=FACTS)
-            loop = osc.Loop(controller, memory, patience=1000, handover=0.1)
+            loop = osc.Loop(controller, memory, patience=4000, handover=0.1)
             with loop:
                 while loop.report.counts.cycles < 500:
                     assert loop.wait(0.01)
                 driver.kill()
                 while loop.wait(0.05):
                     pass
-        time.sleep(5.0)
+        time.sleep(3.0)
     assert "no new state came from the robot" in loop.report.reason
     assert not loop.report.completed
     # The loop has nobody to tell any more; the robot notices and brakes.

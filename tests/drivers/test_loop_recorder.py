@@ -199,7 +199,7 @@ def test_twenty_loops_are_killed(compiled, tmp_path):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("compiled", [False, True])
-def test_twenty_recorders_are_killed_and_the_loop_goes_on(compiled, tmp_path, record_property):
+def test_twenty_recorders_are_killed_and_the_loop_goes_on(compiled, tmp_path):
     behind = []
     with robot_apart("memory", tmp_path) as (where, account):
         for k in range(20):
@@ -241,6 +241,6 @@ def test_twenty_recorders_are_killed_and_the_loop_goes_on(compiled, tmp_path, re
             again = osc.load(folder / "again")
             np.testing.assert_array_equal(again.group("tau"), cycles.tau)
             assert again.ended.how == "completed"
-    record_property("behind", max(behind))
+    print(f"at most {max(behind):.3f} s behind when it was killed")
     assert account["reflexes"] == account["silences"] == 0
     assert account["fastest"] < 0.02
