@@ -208,7 +208,7 @@ def test_twenty_recorders_are_killed_and_the_loop_goes_on(compiled, tmp_path):
             controller, _ = arm()
             *_, posture = controller.stack
             posture.target = controller.robot.q_reference
-            history = osc.SharedHistory(folder / "cycles", controller.robot)
+            history = osc.SharedHistory(folder / "cycles", controller.robot, 200_000)
             loop = osc.Loop(
                 controller,
                 driver_of("memory", where),
