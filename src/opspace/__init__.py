@@ -49,6 +49,7 @@ if TYPE_CHECKING:
     from opspace.loop import Outcome as Outcome
     from opspace.loop import RealTime as RealTime
     from opspace.loop import RobotState as RobotState
+    from opspace.loop import SharedHistory as SharedHistory
     from opspace.loop import Stepping as Stepping
     from opspace.loop import StopRule as StopRule
     from opspace.loop import simulate as simulate
@@ -70,6 +71,7 @@ if TYPE_CHECKING:
     from opspace.robots import available_robots as available_robots
     from opspace.robots import load_robot as load_robot
     from opspace.robots.shapes import LinkCapsule as LinkCapsule
+    from opspace.runs.loop_recorder import LoopRecorder as LoopRecorder
     from opspace.sim import Board as Board
     from opspace.sim import Ground as Ground
     from opspace.sim import Hole as Hole
@@ -143,9 +145,10 @@ _NAMES = {
         "JointTorqueSensor Payload Robot RobotInfo WristSensor available_robots load_robot"
     ),
     "opspace.robots.shapes": "LinkCapsule",
+    "opspace.runs.loop_recorder": "LoopRecorder",
     "opspace.loop": (
-        "AnyPlant Driver DriverFacts Loop LoopReport Observer Outcome RealTime RobotState Stepping "
-        "StopRule simulate"
+        "AnyPlant Driver DriverFacts Loop LoopReport Observer Outcome RealTime RobotState "
+        "SharedHistory Stepping StopRule simulate"
     ),
     "opspace.plan.calibration": "Calibration",
     "opspace.plan.scales": "Singularity",

@@ -797,8 +797,21 @@ def export_as_c(
     name: Annotated[str, typer.Option(help="Name of the model in C.")] = "controller",
     absent: Annotated[
         list[str] | None,
-        typer.Option(metavar="TASK", help="Task that is not there at first; repeatable."),
+        typer.Option(
+            metavar="NAME", help="Task or contact that is not there at first; repeatable."
+        ),
     ] = None,
+    levels: Annotated[
+        list[float] | None,
+        typer.Option(
+            "--level",
+            metavar="NUMBER",
+            help="Level that tasks will move to, beside those there are; repeatable.",
+        ),
+    ] = None,
+    moves: Annotated[
+        int, typer.Option(help="How many moves and swaps can be on their way at once.")
+    ] = 2,
     overrides: Annotated[
         list[str] | None,
         typer.Option("--set", metavar="KEY=VALUE", help="Change one value; repeatable."),
@@ -813,7 +826,8 @@ def export_as_c(
     from opspace.scenario.build import build
 
     controller = build(load_scenario(scenario, overrides or ())).controller
-    export_c(controller, out, name, absent=absent or (), overwrite=overwrite)
+    wanted = {"absent": absent or (), "levels": levels or (), "moves": moves}
+    export_c(controller, out, name, overwrite=overwrite, **wanted)
     print(f"results: {out}")
 
 

@@ -71,7 +71,10 @@ def controller_of(model, gravity="robot"):
     hand = osc.PositionTask(kp=100.0, max_speed=0.25)
     turn = osc.OrientationTask(kp=100.0, max_speed=0.5)
     posture = osc.PostureTask(kp=25.0, max_speed=0.5)
-    stack = osc.Stack([turn, hand, posture], limits=osc.JointLimits(clearance=0.02))
+    # The arm takes less speed near the ends of its joints; the model says nothing of speeds.
+    speeds = dict.fromkeys(robot.joint_names, 1.5)
+    limits = osc.JointLimits(clearance=0.02, speeds=speeds)
+    stack = osc.Stack([turn, hand, posture], limits=limits)
     controller = osc.Controller(
         robot,
         stack,

@@ -15,9 +15,7 @@ from opspace.stack import Blending
 from tests.controller.test_uneven_motors import uneven
 from tests.docs.pages import DOCS, commands_of
 from tests.docs.test_pages import programs_of, run_blocks
-
-CC = shutil.which("cc")
-with_cc = pytest.mark.skipif(CC is None, reason="no C compiler is installed (cc)")
+from tests.export.in_c import CC, STRICT, InC, compiled, with_cc
 
 PROGRAM = """
 #include <stdio.h>
@@ -41,13 +39,6 @@ int main(void)
     return EXIT_SUCCESS;
 }
 """
-STRICT = ("-std=c99", "-Wall", "-Wextra", "-pedantic", "-Werror")
-
-
-def compiled(directory, *sources, out, options=()):
-    words = (*STRICT, *options, *sources, "opspace.c", "opspace_kernels.o", "-lm", "-o", out)
-    subprocess.run([CC, *words], cwd=directory, check=True)
-    return directory / out
 
 
 def start(name="puma560", later=False, **options):
@@ -85,51 +76,6 @@ def test_a_program_gives_the_same_bits_in_random_states(name, tmp_path):
     np.testing.assert_array_equal(found[:, 0], [int(command.status) for command in commands])
     seen = {int(command.status) for command in commands}
     assert len(seen) > 2, "the states should show more than ordinary ticks"
-
-
-class InC:
-    """The exported controller, called from here."""
-
-    def __init__(self, directory, controller, **options):
-        export_c(controller, directory, **options)
-        path = compiled(
-            directory, "controller.c", out="controller.so", options=("-shared", "-fPIC")
-        )
-        self.n, self.library = controller.robot.nv, ctypes.CDLL(str(path))
-        self.library.opspace_open.restype = ctypes.c_void_p
-        self.library.opspace_step.restype = ctypes.c_int64
-        self.library.opspace_read.restype = ctypes.c_void_p
-        model = ctypes.byref(ctypes.c_char.in_dll(self.library, "controller"))
-        self.own = ctypes.c_void_p(self.library.opspace_open(model))
-        assert self.own
-
-    def step(self, t, q, v):
-        tau = np.full(self.n, np.nan)
-        status = self.library.opspace_step(self.own, ctypes.c_double(t), *map(pointer, (q, v, tau)))
-        return status, tau
-
-    def set(self, what, task, *given):
-        i = self.library.opspace_find_task(self.own, task.name.encode())
-        words = [x if isinstance(x, int) else number_or_pointer(x) for x in given]
-        return getattr(self.library, f"opspace_set_{what}")(self.own, i, *words)
-
-    def read(self, name):
-        count = ctypes.c_int64()
-        found = self.library.opspace_read(self.own, name.encode(), ctypes.byref(count))
-        return (
-            None if found is None else np.array((ctypes.c_double * count.value).from_address(found))
-        )
-
-
-def pointer(array):
-    assert array.flags.c_contiguous
-    return ctypes.c_void_p(array.ctypes.data)
-
-
-def number_or_pointer(x):
-    if x is None:
-        return None
-    return ctypes.c_double(x) if isinstance(x, float) else pointer(x)
 
 
 def turned(angle):
@@ -408,10 +354,51 @@ def test_the_page_of_the_library_is_right(tmp_path):
     page = DOCS / "how-to" / "c-library.md"
     done = run_blocks(programs_of(page), tmp_path)
     assert done.returncode == 0, done.stderr
-    (line,) = (one for one in commands_of(page) if one.startswith("cc "))
-    subprocess.run([CC, *STRICT, *line.split()[1:]], cwd=tmp_path, check=True)
+    (line,) = (one for one in commands_of(page) if one.startswith("cc ") and "main.c" in one)
+    words = [CC, *STRICT, *line.split()[1:]]
+    subprocess.run(" ".join(words), cwd=tmp_path, check=True, shell=True)
     done = subprocess.run([tmp_path / "hold"], capture_output=True, text=True, check=True)
     assert done.stdout == "guest: 1\n"
+
+
+FRANKA = """
+#pragma once
+#include <array>
+#include <functional>
+#include <string>
+namespace franka {
+struct Duration { double toSec() const { return 0.0; } };
+struct RobotState {
+    std::array<double, 7> q, dq, tau_J_d;
+    Duration time;
+};
+struct Torques {
+    Torques(const std::array<double, 7> &tau) : tau_J(tau) {}
+    std::array<double, 7> tau_J;
+};
+inline Torques MotionFinished(Torques last) { return last; }
+constexpr double kMaxCutoffFrequency = 1000.0;
+struct Robot {
+    Robot(const std::string &) {}
+    void control(std::function<Torques(const RobotState &, Duration)>, bool, double) {}
+};
+}
+"""
+
+
+@with_cc
+@pytest.mark.skipif(shutil.which("c++") is None, reason="no C++ compiler is installed (c++)")
+def test_the_callback_of_the_page_is_a_program(tmp_path):
+    """Against a stand-in of libfranka's header, whose names are those of the real one."""
+    controller, _ = start()
+    export_c(controller, tmp_path)
+    (tmp_path / "franka").mkdir()
+    (tmp_path / "franka" / "robot.h").write_text(FRANKA)
+    page = (DOCS / "how-to" / "c-library.md").read_text(encoding="utf-8")
+    program = page.split('```cpp title="franka.cpp"\n')[1].split("```")[0]
+    (tmp_path / "franka.cpp").write_text(program)
+    words = ["c++", "-std=c++17", "-Wall", "-Wextra", "-Werror", "-I.", "-fsyntax-only"]
+    subprocess.run([*words, "franka.cpp"], cwd=tmp_path, check=True)
 
 
 @with_cc

@@ -5,14 +5,18 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
+from opspace.contacts import GroundContact
 from opspace.controller.batch import check_count
 from opspace.controller.reference import ReferenceController
 from opspace.errors import InputError, unknown_name
 from opspace.plan.image import Image, image
+from opspace.plan.pack_contacts import fits
 from opspace.plan.pack_task import Packed
-from opspace.plan.plan import Plan
+from opspace.plan.plan import MOST, Plan
 from opspace.robots.adapter import AdapterBase
-from opspace.stack import Member, Variable
+from opspace.stack import ContactMember, Member, Variable
+from opspace.stack.changes import checked_level
+from opspace.stack.members import Place
 from opspace.tasks.tracking import TrackingTask
 
 if TYPE_CHECKING:
@@ -28,6 +32,12 @@ class Exported(NamedTuple):
         image: Its memory.
         period: Time between two ticks that was announced, s; 0 if none was.
         robot_adds: Whether the robot adds the torque against gravity.
+        levels: Numbers of the levels, the most important first.
+        at: Level of each task at first, a place among these.
+        moves: Changes of place that can be on their way at once.
+        base: Coordinates without a motor.
+        contacts: What the robot may touch, packed in this order.
+        there: Which of these it touches at first.
     """
 
     robot: AdapterBase
@@ -35,27 +45,44 @@ class Exported(NamedTuple):
     image: Image
     period: float
     robot_adds: bool
+    levels: tuple[float, ...]
+    at: tuple[int, ...]
+    moves: int
+    base: int
+    contacts: tuple[GroundContact, ...]
+    there: tuple[bool, ...]
 
 
-def exported(controller: Controller, absent: Sequence[str], profile: str) -> Exported:
+def exported(
+    controller: Controller,
+    absent: Sequence[str],
+    profile: str,
+    levels: Sequence[float],
+    moves: int,
+) -> Exported:
     """Lay the tasks of the present stack out as at a start, for somebody else to tick.
 
     Args:
         controller: The controller; nothing about it changes.
-        absent: Names of the tasks that are not there at first.
+        absent: Names of the tasks and contacts that are not there at first.
         profile: Name of the profile of all transitions, see `opspace.Profile`.
+        levels: Numbers of levels to which tasks may move, beside those of the stack.
+        moves: Changes of place that can be on their way at once.
 
     Raises:
-        InputError: The controller does something at its ticks that only Python can.
-        UnknownNameError: The stack has no task of a name, or there is no such profile.
+        InputError: The controller does something at its ticks that only Python can, or there are more
+            moves than there is room for.
+        UnknownNameError: The stack has no task or contact of a name, or there is no such profile.
     """
     _check(controller)
-    members = controller.stack.members
-    names = [member.task.name for member in members]
+    members, contacts = controller.stack.members, tuple(controller.stack.contacts.values())
+    names = [*(member.task.name for member in members), *(one.name for one in contacts)]
     for name in absent:
         if name not in names:
-            raise unknown_name("task in the stack", str(name), names)
+            raise unknown_name("task or contact in the stack", str(name), names)
     check_count(members, "an exported controller")
+    at = [member.level for member in members]
+    numbers = tuple(sorted({*at, *(checked_level(level) for level in levels)}))
     rested = tuple(
         Member(m.task, Variable(float(m.task.name not in absent), profile), m.places)
         for m in members
@@ -66,19 +93,59 @@ def exported(controller: Controller, absent: Sequence[str], profile: str) -> Exp
             f"robot {robot.name!r} is not one of load_robot with hinges and slides; an exported "
             "controller needs its bodies"
         )
-    plan = controller._planned(rested, axes)
+    moves = moves if members else 0
+    plan = controller._planned_apart(_with_room(rested, numbers, moves, profile), axes)
     for packed in plan.packed:
         if not packed.settled:
             raise InputError(_reason(packed))
-    timing = controller._rules.period, controller._robot_adds
-    return Exported(robot, plan, image(plan.handle), *timing)
+    if plan.contacts is not None:
+        everything = [ContactMember(contact, 1.0, 1.0) for contact in contacts]
+        plan.contacts.begin(everything, robot, 0.0)
+    return Exported(
+        robot,
+        plan,
+        image(plan.handle),
+        controller._rules.period,
+        controller._robot_adds,
+        numbers,
+        tuple(numbers.index(level) for level in at),
+        moves,
+        controller._base,
+        contacts,
+        tuple(contact.name not in absent for contact in contacts),
+    )
+
+
+def _with_room(
+    members: tuple[Member, ...], levels: Sequence[float], moves: int, profile: str
+) -> tuple[Member, ...]:
+    """Add places that nobody is at: two for every change, and all levels.
+
+    Raises:
+        InputError: A tick has no room for so many.
+    """
+    room = (MOST - 2 * len(members)) // 2
+    if not 0 <= moves <= room:
+        raise InputError(f"with {len(members)} tasks moves is from 0 to {room}, not {moves}")
+    unused = sorted({*levels} - {member.level for member in members})
+    if len(unused) > 2 * moves:
+        raise InputError(f"{len(unused)} more levels need moves={(len(unused) + 1) // 2} at least")
+    if not moves or not members:
+        return members
+    arrivals = [one for _ in range(moves) for one in [Variable(0.0, profile)] * 2]
+    free = [*unused, *[levels[0]] * (2 * moves - len(unused))]
+    spare = tuple(Place(*one) for one in zip(free, arrivals, strict=True))
+    # Whoever comes to one of them has no more rows than the widest.
+    widest = max(members, key=lambda member: member.task.rows)
+    wide = Member(widest.task, widest.presence, (*widest.places, *spare))
+    return tuple(wide if member is widest else member for member in members)
 
 
 def _check(controller: ReferenceController) -> None:
     """Refuse by name what ticks of Python do and the exported one would leave out."""
     stack, limits = controller.stack, controller.stack.limits
     reasons = {
-        "a floating base: contacts come and go in Python only": controller._base > 0,
+        "a rule of falling": controller._fall is not None,
         "collisions: what is kept apart may move in Python only": controller.collisions is not None,
         "on_time_jump other than 'report'": controller._holds
         or (controller._timing is not None and controller._timing.policy != "report"),
@@ -91,6 +158,13 @@ def _check(controller: ReferenceController) -> None:
     for what, there in reasons.items():
         if there:
             raise InputError(f"an exported controller cannot have {what}")
+    for contact in stack.contacts.values():
+        if contact.activation is not None:
+            raise InputError(
+                f"an exported controller cannot call the activation of {contact.name!r}"
+            )
+    if not fits(stack.touching):
+        raise InputError("an exported controller cannot have a contact of one's own class")
     if own := controller._not_compiled():  # pyright: ignore[reportAttributeAccessIssue]
         raise InputError(f"an exported controller cannot call {own}")
 

@@ -70,6 +70,7 @@ class FrankaDriver:
         self._felt = felt
         self._robot: Any = None
         self._control: Any = None
+        self._ended = ""
 
     def start(self) -> None:
         """Connect, and begin to command torques.
@@ -93,7 +94,7 @@ class FrankaDriver:
             RobotStoppedError: The robot has stopped, and why.
         """
         del timeout
-        with self._told():
+        with self._moving():
             state, _ = self._control.readOnce()
         q, wrenches = np.array(state.q), None
         if self._felt is not None:
@@ -108,13 +109,13 @@ class FrankaDriver:
         Raises:
             RobotStoppedError: The robot has stopped, and why.
         """
-        with self._told():
+        with self._moving():
             self._control.writeOnce(self._library.Torques(tau.tolist()))
 
     def stop(self) -> None:
         """End the motion; the robot holds itself, and closes its brakes when it is told to."""
         control, self._control = self._control, None
-        if control is not None:
+        if control is not None and not self._ended:
             last = self._library.Torques([0.0] * JOINTS)
             last.motion_finished = True
             # Where it has stopped by itself there is nothing to end.
@@ -125,6 +126,18 @@ class FrankaDriver:
         if robot is not None:
             with contextlib.suppress(self._library.FrankaException, RuntimeError):
                 robot.stop()
+
+    @contextlib.contextmanager
+    def _moving(self) -> Iterator[None]:
+        """Use a motion that goes on: asked about one that has ended, the client waits for ever."""
+        if self._ended:
+            raise RobotStoppedError(self._ended)
+        try:
+            with self._told():
+                yield
+        except RobotStoppedError as error:
+            self._ended = str(error)
+            raise
 
     @contextlib.contextmanager
     def _told(self) -> Iterator[None]:

@@ -15,13 +15,15 @@ from opspace.controller.exported import Exported, exported
 from opspace.controller.reference import ReferenceController
 from opspace.controller.watchdog import JUMP, MISSED
 from opspace.errors import InputError
-from opspace.kernels import columns
-from opspace.law import press_columns
+from opspace.kernels import columns, stance_columns
+from opspace.law import PROFILES, press_columns
+from opspace.law.scalars import NO_GROUP, TANH_EDGE
 from opspace.machine.processor import host
 from opspace.plan.entries import KERNELS
 from opspace.plan.pack_task import Packed
 from opspace.plan.records import TICK
 from opspace.record.whole_file import whole_file
+from opspace.stack import contact_course
 from opspace.tasks.way_round import LARGEST_STEP
 
 SOURCES = Path(__file__).parent / "c"
@@ -38,11 +40,17 @@ COLUMNS = {
 """What the C source must know of `opspace.kernels.columns`, by the array that has it."""
 PRESS = ("GIVEN", "GIVEN_AT", "WANTED", "FORCES", "ON", "KI", "KP", "PRESS_SIZE")
 """What it must know of `opspace.law.press_columns`."""
+INNER = (
+    "space.first_kept",
+    *(f"stance.{name}" for name in ("count", "rows", "place", "edges", "numbers", "motion")),
+    *(f"stance.{name}" for name in ("force", "most", "cone", "metric", "reference", "hindrance")),
+)
+"""Arrays of records in the record of a tick that the C source writes."""
 CMAKE = """\
 cmake_minimum_required(VERSION 3.13)
 project(opspace_{name} LANGUAGES C)
 
-add_library(opspace_{name} STATIC {name}.c opspace.c opspace_kernels.o)
+add_library(opspace_{name} STATIC {name}.c {sources} opspace_kernels.o)
 add_library(opspace::{name} ALIAS opspace_{name})
 set_source_files_properties(opspace_kernels.o PROPERTIES EXTERNAL_OBJECT TRUE)
 set_target_properties(opspace_{name} PROPERTIES C_STANDARD 99 POSITION_INDEPENDENT_CODE ON)
@@ -64,6 +72,8 @@ def export_c(
     name: str = "controller",
     *,
     absent: Sequence[str] = (),
+    levels: Sequence[float] = (),
+    moves: int = 2,
     profile: str = "quintic",
     overwrite: bool = False,
 ) -> Path:
@@ -76,7 +86,10 @@ def export_c(
         controller: A `Controller`.
         directory: Where the files go; it is made.
         name: Name of the model in C, and of its files.
-        absent: Names of tasks of the stack that are not there at first and come later.
+        absent: Names of tasks and contacts of the stack that are not there at first and come later.
+        levels: Numbers of levels to which tasks will move, beside those of the stack.
+        moves: How many moves and swaps can be on their way at once; each has its memory and its part
+            of a tick.
         profile: Profile of all transitions, see `opspace.Profile`.
         overwrite: Replace files that are already there.
 
@@ -86,20 +99,20 @@ def export_c(
     Raises:
         InputError: The controller does something at its ticks that only Python can; the name is no
             name in C; a file is there already or cannot be written.
-        UnknownNameError: The stack has no task of a name, or there is no such profile.
+        UnknownNameError: The stack has no task or contact of a name, or there is no such profile.
     """
     if not isinstance(controller, Controller):
         raise InputError(f"only a Controller can be exported, not {type(controller).__name__}")
     if not NAME.fullmatch(name) or name.startswith("opspace"):
         raise InputError(f"{name!r} is no name for a model in C: letters, digits and _")
-    found = exported(controller, absent, profile)
+    found = exported(controller, absent, profile, levels, moves)
     files = {
         "opspace_codes.h": _codes().encode(),
         "opspace_layout.h": _layout().encode(),
         f"{name}.h": _header(name, found).encode(),
-        f"{name}.c": _source(name, found).encode(),
+        f"{name}.c": _source(name, found, PROFILES.index(profile)).encode(),
         "opspace_kernels.o": KERNELS.object(),
-        "CMakeLists.txt": CMAKE.format(name=name).encode(),
+        "CMakeLists.txt": CMAKE.format(name=name, sources=" ".join(_c_sources())).encode(),
         **{path.name: path.read_bytes() for path in sorted(SOURCES.iterdir())},
     }
     directory = Path(directory)
@@ -107,6 +120,11 @@ def export_c(
         with whole_file(directory / file, overwrite=overwrite) as unfinished:
             unfinished.write_bytes(content)
     return directory
+
+
+def _c_sources() -> list[str]:
+    """List the sources of the library."""
+    return sorted(path.name for path in SOURCES.glob("*.c"))
 
 
 def _codes() -> str:
@@ -144,7 +162,21 @@ def _layout() -> str:
         "TIME_JUMP_PERIODS": JUMP,
         "TIME_LATE_PERIODS": MISSED,
         "HALF_TURN": np.pi,
+        "TANH_EDGE": TANH_EDGE,
+        "CONTACT_MOTION_PART": contact_course.MOTION_PART,
+        "CONTACT_STOP": contact_course.STOP,
+        "CONTACT_CALMER": contact_course.CALMER,
+        "CONTACT_CALMEST": contact_course.CALMEST,
+        "CONTACT_RECOVERY": contact_course.RECOVERY,
     }
+    whole = {
+        **{f"PROFILE_{one.upper().replace('-', '_')}": k for k, one in enumerate(PROFILES)},
+        "GROUP_NONE": NO_GROUP,
+        "CONTACT_PLACE_SIZE": stance_columns.PLACE_SIZE,
+        "CONTACT_NUMBERS_SIZE": stance_columns.NUMBERS_SIZE,
+        "CONTACT_CONE_SIZE": stance_columns.MOST_EDGES * stance_columns.SOLE_ROWS,
+    }
+    lines += [f"#define {word} {x}\n" for word, x in whole.items()]
     lines += [f"#define {word} {float(x)!r}\n" for word, x in numbers.items()]
     return f"{_written()}{''.join(lines)}"
 
@@ -158,6 +190,10 @@ def _header(name: str, found: Exported) -> str:
         word = re.sub(r"\W", "_", packed.task.name, flags=re.ASCII)
         if numbers.setdefault(f"{name.upper()}_TASK_{word}", i) != i:
             raise InputError(f"in C the name of task {packed.task.name!r} is another task's, too")
+    for i, contact in enumerate(found.contacts):
+        word = re.sub(r"\W", "_", contact.name, flags=re.ASCII)
+        if numbers.setdefault(f"{name.upper()}_CONTACT_{word}", i) != i:
+            raise InputError(f"in C the name of contact {contact.name!r} is another one's, too")
     enum = "".join(f"    {word} = {x},\n" for word, x in numbers.items())
     return (
         f'{_written()}#ifndef {guard}\n#define {guard}\n\n#include "opspace.h"\n\n'
@@ -167,20 +203,25 @@ def _header(name: str, found: Exported) -> str:
     )
 
 
-def _source(name: str, found: Exported) -> str:
+def _source(name: str, found: Exported, profile: int) -> str:
     """Write the numbers of the model."""
     words, runs = found.image.words, list(_runs(found.image.words))
     content = [format(x, "#x") for first, count in runs for x in words[first : first + count]]
-    tasks = [_task(packed) for packed in found.plan.packed]
+    tasks = [_task(packed, at) for packed, at in zip(found.plan.packed, found.at, strict=True)]
+    outer = {field.name: int(field.dtype is np.int64) for field in TICK.fields}
     fields = [
-        f'{{"{field.name}", {found.image.first[field.name]}, {_size(found, field.name)}, '
-        f"{int(field.dtype is np.int64)}}}"
-        for field in TICK.fields
-        if field.name in found.image.first
+        f'{{"{inner}", {found.image.first[inner]}, {_size(found, inner)}, {own}}}'
+        for inner, own in {**outer, **dict.fromkeys(INNER, 1)}.items()
+        if inner in found.image.first
     ]
+    touched = [_contact(found, i) for i in range(len(found.contacts))]
     arrays = {
         "const char *const joint": [_text(joint) for joint in found.robot.joint_names],
         "const opspace_task task": tasks or ["{0}"],
+        "const double level": [repr(level) for level in found.levels] or ["0"],
+        "const int quaternion": list(map(str, found.robot.description.quaternions)) or ["0"],
+        **{f"const double contact_{i}": x for i, (_, x) in enumerate(touched)},
+        "const opspace_contact contact": [words for words, _ in touched] or ["{0}"],
         "const opspace_field field": fields,
         "const opspace_run run": [f"{{{first}, {count}}}" for first, count in runs],
         "const uint64_t content": content,
@@ -192,7 +233,9 @@ def _source(name: str, found: Exported) -> str:
     members = [
         _text(KERNELS.stamp),
         *map(str, (found.plan.n, found.robot.nq, len(tasks))),
-        *("joint", "task", str(len(fields)), "field"),
+        *("joint", "task", str(found.moves), str(profile), str(len(found.levels)), "level"),
+        *(str(found.base), str(len(found.robot.description.quaternions)), "quaternion"),
+        *(str(len(found.contacts)), "contact", str(len(fields)), "field"),
         *(repr(found.period), str(int(found.robot_adds))),
         *map(str, (words.size, found.image.handle, len(runs))),
         *("run", "content", str(found.image.addresses.size), "address"),
@@ -203,13 +246,31 @@ def _source(name: str, found: Exported) -> str:
     )
 
 
-def _task(packed: Packed) -> str:
+def _contact(found: Exported, i: int) -> tuple[str, list[str]]:
+    """Write a contact, and the numbers that it leads to."""
+    assert found.plan.contacts is not None
+    stance, contact = found.plan.contacts.record, found.contacts[i]
+    body, joint, rows, first = stance.place[i].tolist()
+    own = slice(first, first + rows)
+    numbers = [stance.numbers[i], stance.cone[i].ravel(), stance.metric[own], stance.reference[own]]
+    words = [_text(contact.name), int(found.there[i]), rows, body, joint, stance.edges[i].item()]
+    words += [_number(stance.most[i].item()), f"contact_{i}"]
+    content = [_number(x) for x in np.concatenate(numbers).tolist()]
+    return f"{{{', '.join(map(str, words))}}}", content
+
+
+def _number(x: float) -> str:
+    """Write a double so that it comes back to the last bit; what has no end is larger than all."""
+    return repr(x) if np.isfinite(x) else "1e999"
+
+
+def _task(packed: Packed, level: int) -> str:
     kind = packed._tick.kind[packed.index]
     position, rotation, joints = _target(packed, kind)
     rows = packed.rows
     return (
         f"{{{_text(packed.task.name)}, {rows.start}, {rows.stop - rows.start}, "
-        f"{position}, {rotation}, {joints}}}"
+        f"{position}, {rotation}, {joints}, {level}}}"
     )
 
 
@@ -223,7 +284,10 @@ def _target(packed: Packed, kind: np.ndarray) -> tuple[int, int, int]:
 
 
 def _size(found: Exported, name: str) -> int:
-    return getattr(found.plan.tick, name).size
+    record = found.plan.tick
+    for part in name.split("."):
+        record = getattr(record, part)
+    return record.size
 
 
 def _runs(words: np.ndarray) -> Iterator[tuple[int, int]]:

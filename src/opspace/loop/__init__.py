@@ -12,3 +12,4 @@ from opspace.loop.loop import simulate as simulate
 from opspace.loop.loop_report import LoopReport as LoopReport
 from opspace.loop.real_time import RealTime as RealTime
 from opspace.loop.robot_loop import Loop as Loop
+from opspace.loop.shared_history import SharedHistory as SharedHistory

@@ -125,7 +125,6 @@ class FreeCycles:
             return
         assert ready is not None
         plan, letters, record, _ = ready
-        self._history.seen = int(record.whole[c.RING])
         stack = self._controller.stack
         if not stack.settled or stack.waiting:
             record.asked[0] = 1
@@ -153,7 +152,6 @@ class FreeCycles:
         assert self._ready is not None
         plan, _, record, address = self._ready
         record.whole[c.SEEN] = self._driver.seen
-        record.whole[c.RING] = self._history.seen
         record.whole[[c.FROZEN_FOR, c.STATUSES]] = 0
         record.number[[c.LAST, c.HEARD, c.ENDS]] = last.t, heard, ends
         record.before[:] = sent
@@ -164,7 +162,6 @@ class FreeCycles:
         finally:
             self._runs = False
             self._driver.seen = int(record.whole[c.SEEN])
-            self._history.seen = int(record.whole[c.RING])
             # The tick of Python that comes next is none of those before.
             if self._controller._timing is not None:
                 self._controller._timing.forget()
@@ -203,6 +200,7 @@ class FreeCycles:
             "count": self._count,
             "time": moment,
             "ring": self._history.rows,
+            "whole": self._history.whole,
         }
         record = CYCLES.make(sizes, given)
         start = moment.__array_interface__["data"][0]

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from opspace.errors import InputError
+from opspace.kernels.cycle_columns import RING, WHOLES
 
 
 class Cycles(NamedTuple):
@@ -29,12 +30,17 @@ class Cycles(NamedTuple):
     answered: np.ndarray
 
 
+def width_of(nq: int, n: int) -> int:
+    """Count the numbers of a cycle."""
+    return 3 + nq + 2 * n
+
+
 class History:
     """A ring of cycles.
 
     Attributes:
         rows: t, q, v, tau, status and time to the answer of each, in any order.
-        seen: How many there have been.
+        whole: Whole numbers of compiled cycles, see `opspace.kernels.cycle_columns`.
 
     Args:
         rows: How many are remembered.
@@ -48,9 +54,22 @@ class History:
     def __init__(self, rows: int, nq: int, n: int) -> None:
         if rows < 1:
             raise InputError(f"a history has at least one cycle, not {rows}")
-        self.rows = np.full((rows, 3 + nq + 2 * n), np.nan)
+        self.rows = np.full((rows, width_of(nq, n)), np.nan)
+        self.whole = np.zeros(WHOLES, np.int64)
         self._ends = np.cumsum([1, nq, n, n, 1])
-        self.seen = 0
+
+    @property
+    def seen(self) -> int:
+        """How many cycles there have been."""
+        return int(self.whole[RING])
+
+    def end(self, how: str, reason: str) -> None:
+        """Say that there will be no more of them, to whoever else looks.
+
+        Args:
+            how: ``completed``, ``stopped`` or ``crashed``.
+            reason: Why.
+        """
 
     def add(
         self,
@@ -69,7 +88,7 @@ class History:
         row[ends[2] : ends[3]] = tau
         row[-2] = status
         row[-1] = answered
-        self.seen += 1
+        self.whole[RING] += 1
 
     def cycles(self) -> Cycles:
         """Copy what is remembered; from any thread, where the row being written may be a mixture."""

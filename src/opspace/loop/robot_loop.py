@@ -13,13 +13,13 @@ from opspace.command import Status
 from opspace.controller import ReferenceController
 from opspace.controller.handover import Handover
 from opspace.controller.watchdog import JUMP, MISSED
-from opspace.errors import InputError, OpspaceError
+from opspace.errors import InputError, OpspaceError, RobotStoppedError
 from opspace.kernels.cycle_columns import FROZEN, JUMPED, OVER, SILENT
 from opspace.kernels.cycle_columns import STOPPED as STOPPED_BY_STATUS
 from opspace.loop.declared import HoldCheck, check_declared
 from opspace.loop.driver import Driver, RobotState
 from opspace.loop.free_cycles import FreeCycles
-from opspace.loop.history import Cycles, History
+from opspace.loop.history import Cycles, History, width_of
 from opspace.loop.loop import Observer, Stepping, StopRule, answered
 from opspace.loop.loop_report import Counts, LoopReport, answer_times
 from opspace.loop.real_time import RealTime
@@ -84,7 +84,7 @@ class Loop:
         hold_check: How long the robot is watched before it moves, s; 0 does without.
         handover: How long it takes from holding still to the controller's torque, s.
         patience: How many periods without a new state are waited for.
-        history: How many cycles are remembered.
+        history: How many cycles are remembered, or a `opspace.SharedHistory`, which other processes see.
         real_time: What to ask of the operating system; None for nothing.
         compiled: Have compiled code go through the cycles, with a robot behind shared memory: no other
             thread of Python, whatever it does, is waited for. Targets and gains change as before. While
@@ -107,7 +107,7 @@ class Loop:
         hold_check: float = 0.2,
         handover: float = 0.5,
         patience: int = 5,
-        history: int = 10_000,
+        history: int | History = 10_000,
         real_time: RealTime | None = None,
         compiled: bool = False,
     ) -> None:
@@ -134,7 +134,11 @@ class Loop:
         self._patience = patience * facts.period
         self._rate = TorqueRate(facts.torque_rate, facts.period, robot.nv)
         self._real_time = real_time
-        self._history = History(history, robot.nq, robot.nv)
+        if isinstance(history, int):
+            history = History(history, robot.nq, robot.nv)
+        if history.rows.shape[1] != width_of(robot.nq, robot.nv) or history.seen:
+            raise InputError("the history is that of another robot, or of a loop before this one")
+        self._history = history
         self._desk = RequestDesk(Changes(controller, tasks), answer=_answered)
         self._free: FreeCycles | None = None
         if compiled:
@@ -292,6 +296,7 @@ class Loop:
             self._fail(error)
         finally:
             self._stop_driver()
+            self._say_the_end()
             self._desk.close()
             give_back()
             self._moves.set()
@@ -302,6 +307,10 @@ class Loop:
         refused, give_back = self._real_time.take()
         self._notes += refused
         return give_back
+
+    def _say_the_end(self) -> None:
+        how = "stopped" if self._error is None else "crashed"
+        self._history.end("completed" if self._completed else how, self._reason)
 
     def _end(self, reason: str) -> None:
         if not self._reason:
@@ -340,8 +349,8 @@ class Loop:
         """Let the controller have the robot, and brake it."""
         try:
             self._control()
-        except _NoStateError:
-            # Without a state nothing brakes that does not know it itself.
+        except (_NoStateError, RobotStoppedError):
+            # Without a state nothing brakes that does not know it itself; who has stopped is not asked.
             raise
         except Exception as error:
             self._fail(error)

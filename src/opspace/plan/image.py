@@ -21,8 +21,8 @@ class Image(NamedTuple):
         words: (N,) uint64, the contents; an address counts words from the first one.
         addresses: Which words are addresses.
         handle: Word where the handle of the record begins.
-        first: Word where each array of the record begins, by name; those without numbers are not
-            there.
+        first: Word where each array of the record begins, by name; those of a record in it have its
+            name and a dot before theirs. Those without numbers are not there.
     """
 
     words: np.ndarray
@@ -66,11 +66,7 @@ def image(handle: Handle) -> Image:
         return begin
 
     begin = put(handle)
-    found = {
-        name: place(field)
-        for name, field in handle.fields.items()
-        if not isinstance(field, Handle) and field.size
-    }
+    found = {name: place(field) for name, field in _named(handle) if field.size}
     return Image(np.concatenate(words), np.array(sorted(addresses)), begin, found)
 
 
@@ -80,6 +76,14 @@ def _arrays(handle: Handle) -> Iterator[np.ndarray]:
             yield from _arrays(field)
         elif field.size:
             yield field
+
+
+def _named(handle: Handle, before: str = "") -> Iterator[tuple[str, np.ndarray]]:
+    for name, field in handle.fields.items():
+        if isinstance(field, Handle):
+            yield from _named(field, f"{before}{name}.")
+        else:
+            yield before + name, field
 
 
 def _extent(array: np.ndarray) -> tuple[int, int]:

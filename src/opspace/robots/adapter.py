@@ -279,7 +279,8 @@ class AdapterBase(ABC):
         """
         self.place(q, v)
         for i in self.description.quaternions:
-            length = math.sqrt(sum([x * x for x in self._q_memory[i : i + 4]]))
+            w, x, y, z = self._q_memory[i : i + 4]
+            length = math.sqrt(w * w + x * x + y * y + z * z)  # which the library in C sums alike
             if not 1e-6 <= length < math.inf:
                 self.check_state(self._q, self._v)
             self._q[i : i + 4] /= length

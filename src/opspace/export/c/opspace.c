@@ -1,6 +1,5 @@
 /* Everything of an exported controller that is not its mathematics; see opspace.h. */
-#include "opspace.h"
-#include "opspace_layout.h"
+#include "opspace_inside.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -10,43 +9,6 @@
 extern int64_t opspace_tick(double t, void *handle);
 extern void opspace_gravity(void *handle);
 extern const char opspace_stamp[];
-
-/* Joined sums would round otherwise than in Python. */
-#if defined(__clang__)
-#pragma STDC FP_CONTRACT OFF
-#elif defined(__GNUC__)
-#pragma GCC optimize("fp-contract=off")
-#endif
-
-/* Columns of an activation in time. */
-enum { PROFILE, TARGET, START, DURATION, PHASE, RATE, ACCELERATION, WIDTH, CRUISE };
-
-/* What is asked for between two steps, from any thread: a ring of letters. Whoever writes one takes a
- * number, which is the only thing that writers share, and says by it that the letter is there; the step
- * takes letters in order up to the first that is not. Nobody waits for anybody. */
-enum { LETTERS = 64 };
-enum { TARGET_LETTER, GAINS_LETTER, FORCE_LETTER, PRESENCE_LETTER };
-
-typedef struct {
-    unsigned turn; /* the number of its writer while it is empty, one more while it is full */
-    int what;
-    int task;
-    double *x;
-} letter;
-
-struct opspace {
-    const opspace_model *model;
-    uint64_t *words;
-    void *handle;
-    double *q, *v, *tau, *M, *bias, *torque_limit, *torque_middle, *option;
-    double *gravity, *variable, *own, *numbers, *goal, *kp, *kv, *press;
-    int64_t *kind, *endless;
-    double before;
-    int begun;
-    letter ring[LETTERS];
-    double *paper;
-    unsigned written, taken;
-};
 
 static const opspace_field *find_field(const opspace *c, const char *name)
 {
@@ -97,6 +59,24 @@ static void find_fields(opspace *c)
     c->press = memory_of(c, "press");
     c->kind = memory_of(c, "kind");
     c->endless = memory_of(c, "endless");
+    c->group = memory_of(c, "group");
+    c->slots = memory_of(c, "slots");
+    c->slot_on = memory_of(c, "slot_on");
+    c->slot_off = memory_of(c, "slot_off");
+    c->slot_place = memory_of(c, "slot_place");
+    c->first_kept = memory_of(c, "space.first_kept");
+    c->stance.count = memory_of(c, "stance.count");
+    c->stance.rows = memory_of(c, "stance.rows");
+    c->stance.place = memory_of(c, "stance.place");
+    c->stance.edges = memory_of(c, "stance.edges");
+    c->stance.numbers = memory_of(c, "stance.numbers");
+    c->stance.motion = memory_of(c, "stance.motion");
+    c->stance.force = memory_of(c, "stance.force");
+    c->stance.most = memory_of(c, "stance.most");
+    c->stance.cone = memory_of(c, "stance.cone");
+    c->stance.metric = memory_of(c, "stance.metric");
+    c->stance.reference = memory_of(c, "stance.reference");
+    c->stance.hindrance = memory_of(c, "stance.hindrance");
 }
 
 /* Numbers of the longest letter. */
@@ -123,7 +103,7 @@ static int make_ring(opspace *c)
 }
 
 /* Take the next empty letter; NULL where there is none. */
-static letter *empty_letter(opspace *c, int what, int task, unsigned *number)
+static letter *empty_letter(opspace *c, int what, int about, unsigned *number)
 {
     unsigned mine = __atomic_load_n(&c->written, __ATOMIC_RELAXED);
     for (;;) {
@@ -133,7 +113,7 @@ static letter *empty_letter(opspace *c, int what, int task, unsigned *number)
             if (__atomic_compare_exchange_n(
                     &c->written, &mine, mine + 1, 0, __ATOMIC_RELAXED, __ATOMIC_RELAXED)) {
                 one->what = what;
-                one->task = task;
+                one->about = about;
                 *number = mine;
                 return one;
             }
@@ -159,12 +139,15 @@ opspace *opspace_open(const opspace_model *model)
         return NULL;
     c->model = model;
     c->words = calloc((size_t)model->words, sizeof *c->words);
-    if (!c->words || !make_ring(c)) {
+    c->state = calloc((size_t)(model->nq + model->n), sizeof *c->state);
+    if (!c->words || !c->state || !make_ring(c) || !opspace_make_places(c) || !opspace_make_contacts(c)) {
         opspace_close(c);
         return NULL;
     }
+    c->last = c->state + model->nq;
     lay_out(c);
     find_fields(c);
+    opspace_pack_places(c);
     return c;
 }
 
@@ -173,6 +156,12 @@ void opspace_close(opspace *c)
     if (c) {
         free(c->words);
         free(c->paper);
+        free(c->state);
+        free(c->place);
+        free(c->places);
+        free(c->change);
+        free(c->footing);
+        free(c->touching);
     }
     free(c);
 }
@@ -218,13 +207,15 @@ static int64_t watch(const opspace *c, double t, const double *q, const double *
     return found;
 }
 
+/* A robot that stands on nothing but contacts brakes from the torque that carried it. */
 static void brake(const opspace *c, double *tau)
 {
     int n = c->model->n;
+    const double *held = c->carried ? c->last : c->bias;
     for (int i = 0; i < n; i++) {
-        double most = fmin(c->torque_limit[i], 1.7976931348623157e308);
+        double most = i < c->model->base ? 0.0 : fmin(c->torque_limit[i], 1.7976931348623157e308);
         double middle = c->torque_middle[i];
-        double x = c->bias[i] - c->option[OPTION_DAMPING] * c->M[i * n + i] * c->v[i] - middle;
+        double x = held[i] - c->option[OPTION_DAMPING] * c->M[i * n + i] * c->v[i] - middle;
         tau[i] = isnan(x) ? 0.0 : fmax(fmin(x, most), -most) + middle;
     }
 }
@@ -259,28 +250,62 @@ static int all_measured(const opspace *c)
 
 static void read_letters(opspace *c);
 
+/* Quaternions as they are to be; 0 where one has no direction. */
+static int normalise(const opspace *c, double *q)
+{
+    for (int i = 0; i < c->model->quaternions; i++) {
+        double *x = q + c->model->quaternion[i];
+        double length = sqrt(x[0] * x[0] + x[1] * x[1] + x[2] * x[2] + x[3] * x[3]);
+        if (!(length >= 1e-6 && isfinite(length)))
+            return 0;
+        for (int k = 0; k < 4; k++)
+            x[k] /= length;
+    }
+    return 1;
+}
+
+static int64_t answered(opspace *c, int64_t answer, double *tau)
+{
+    const opspace_model *m = c->model;
+    if (answer < 0) {
+        brake(c, tau);
+        without_gravity(c, tau);
+        return OPSPACE_FAULT;
+    }
+    memcpy(tau, c->tau, (size_t)m->n * sizeof *tau);
+    without_gravity(c, tau);
+    if (m->base > 0) {
+        memcpy(c->last, tau, (size_t)m->n * sizeof *tau);
+        c->carried = 1;
+        c->hindrance = *c->stance.hindrance;
+    }
+    return answer % ANSWER_SOLVE;
+}
+
 int64_t opspace_step(opspace *c, double t, const double *q, const double *v, double *tau)
 {
     const opspace_model *m = c->model;
     if (!isfinite(t) || !all_finite(q, m->nq) || !all_finite(v, m->n))
         return OPSPACE_NOT_FINITE;
-    read_letters(c);
-    if (!all_measured(c))
+    memcpy(c->state, q, (size_t)m->nq * sizeof *q);
+    if (!normalise(c, c->state))
+        return OPSPACE_NOT_FINITE;
+    if (!all_measured(c)) {
+        read_letters(c);
         return OPSPACE_NO_WRENCH;
-    int64_t timing = watch(c, t, q, v);
+    }
+    opspace_move_contacts(c, c->begun ? fmax(0.0, t - c->before) : 0.0);
+    read_letters(c);
+    opspace_tidy_places(c, t);
+    int64_t found = watch(c, t, c->state, v);
     c->before = t;
     c->begun = 1;
-    memcpy(c->q, q, (size_t)m->nq * sizeof *q);
+    memcpy(c->q, c->state, (size_t)m->nq * sizeof *q);
     memcpy(c->v, v, (size_t)m->n * sizeof *v);
+    if (m->base > 0)
+        found |= opspace_touch(c);
     int64_t answer = opspace_tick(t, c->handle);
-    if (answer < 0) {
-        brake(c, tau);
-        without_gravity(c, tau);
-        return timing | OPSPACE_FAULT;
-    }
-    memcpy(tau, c->tau, (size_t)m->n * sizeof *tau);
-    without_gravity(c, tau);
-    return answer % ANSWER_SOLVE | timing;
+    return found | answered(c, answer, tau);
 }
 
 int opspace_find_task(const opspace *c, const char *name)
@@ -465,44 +490,87 @@ int opspace_set_activation(opspace *c, int task, double activation)
     return 0;
 }
 
-/* Phase of an activation in time, its rate and its acceleration: the rate is led by a cubic from what
- * it was to what it is to be, and stays there. */
-static void phase_at(const double *x, double t, double *s, double *rate, double *acceleration)
+/* Take a change of place for whoever asks for one; 0 where all are on their way. */
+static int take_change(opspace *c)
 {
-    double tau = fmax(t - x[START], 0.0), w = x[WIDTH];
-    if (tau >= x[DURATION]) {
-        *s = x[TARGET];
-        *rate = *acceleration = 0.0;
-        return;
-    }
-    if (tau >= w) {
-        double covered = w * ((x[RATE] + x[CRUISE]) / 2.0 + w * x[ACCELERATION] / 12.0);
-        *s = x[PHASE] + covered + x[CRUISE] * (tau - w);
-        *rate = x[CRUISE];
-        *acceleration = 0.0;
-        return;
-    }
-    double y = tau / w, y2 = pow(y, 2.0), y3 = pow(y, 3.0), y4 = pow(y, 4.0);
-    *s = x[PHASE] + w * (x[RATE] * (y4 / 2 - y3 + y)
-        + x[ACCELERATION] * w * (y4 / 4 - 2 * y3 / 3 + y2 / 2) + x[CRUISE] * (y3 - y4 / 2));
-    *rate = x[RATE] * (2 * y3 - 3 * y2 + 1) + x[ACCELERATION] * w * (y3 - 2 * y2 + y)
-        + x[CRUISE] * (3 * y2 - 2 * y3);
-    *acceleration = (x[CRUISE] - x[RATE]) * (6 * y - 6 * y2) / w
-        + x[ACCELERATION] * (3 * y2 - 4 * y + 1);
+    int there = __atomic_load_n(&c->room, __ATOMIC_RELAXED);
+    while (there > 0)
+        if (__atomic_compare_exchange_n(
+                &c->room, &there, there - 1, 0, __ATOMIC_ACQUIRE, __ATOMIC_RELAXED))
+            return 1;
+    return 0;
 }
 
-static void write_ramp(
-    double *x, double target, double t, double duration, double phase, double rate,
-    double acceleration, double width, double cruise)
+static int ask_for_change(
+    opspace *c, int what, int task, double other, double t, double duration)
 {
-    x[TARGET] = target;
-    x[START] = t;
-    x[DURATION] = duration;
-    x[PHASE] = phase;
-    x[RATE] = rate;
-    x[ACCELERATION] = acceleration;
-    x[WIDTH] = width;
-    x[CRUISE] = cruise;
+    unsigned number;
+    if (c->model->moves == 0 || !isfinite(t) || !isfinite(duration) || duration < 0.0)
+        return OPSPACE_REFUSED;
+    if (!take_change(c))
+        return OPSPACE_BUSY;
+    letter *letter = empty_letter(c, what, task, &number);
+    if (!letter) {
+        __atomic_fetch_add(&c->room, 1, __ATOMIC_RELEASE);
+        return OPSPACE_BUSY;
+    }
+    letter->x[0] = other;
+    letter->x[1] = t;
+    letter->x[2] = duration;
+    send(letter, number);
+    return 0;
+}
+
+int opspace_move(opspace *c, int task, double level, double t, double duration)
+{
+    if (!task_at(c, task))
+        return OPSPACE_NO_TASK;
+    for (int i = 0; i < c->model->levels; i++)
+        if (c->model->level[i] == level)
+            return ask_for_change(c, MOVE_LETTER, task, i, t, duration);
+    return OPSPACE_REFUSED;
+}
+
+int opspace_swap(opspace *c, int first, int second, double t, double duration)
+{
+    if (!task_at(c, first) || !task_at(c, second))
+        return OPSPACE_NO_TASK;
+    if (first == second)
+        return OPSPACE_REFUSED;
+    return ask_for_change(c, SWAP_LETTER, first, second, t, duration);
+}
+
+int opspace_find_contact(const opspace *c, const char *name)
+{
+    for (int i = 0; i < c->model->contacts; i++)
+        if (strcmp(c->model->contact[i].name, name) == 0)
+            return i;
+    return OPSPACE_NO_TASK;
+}
+
+int opspace_contact_row(const opspace *c, int contact)
+{
+    for (int i = 0; i < c->touches; i++)
+        if (c->touching[i] == contact)
+            return i;
+    return OPSPACE_NO_TASK;
+}
+
+int opspace_set_contact(opspace *c, int contact, int present, double duration, int wait)
+{
+    if (contact < 0 || contact >= c->model->contacts)
+        return OPSPACE_NO_TASK;
+    if (!isfinite(duration) || duration < 0.0)
+        return OPSPACE_REFUSED;
+    unsigned number;
+    letter *letter = empty_letter(c, CONTACT_LETTER, contact, &number);
+    if (!letter)
+        return OPSPACE_BUSY;
+    letter->x[0] = present ? 1.0 : 0.0;
+    letter->x[1] = duration;
+    letter->x[2] = wait ? 1.0 : 0.0;
+    send(letter, number);
+    return 0;
 }
 
 int opspace_set_presence(opspace *c, int task, int present, double t, double duration)
@@ -522,30 +590,33 @@ int opspace_set_presence(opspace *c, int task, int present, double t, double dur
     return 0;
 }
 
-static void let_come_or_go(opspace *c, int task, double target, double t, double duration)
+static void open_letter(opspace *c, const letter *one)
 {
-    double *x = c->variable + task * VARIABLE_SIZE;
-    double s, rate, acceleration;
-    if ((x[DURATION] == 0.0 || t >= x[START] + x[DURATION]) && x[TARGET] == target)
-        return;
-    if (duration < 1e-9) {
-        write_ramp(x, target, t, 0.0, target, 0.0, 0.0, 0.0, 0.0);
-        return;
+    const double *x = one->x;
+    const opspace_task *task = &c->model->task[one->about];
+    switch (one->what) {
+    case TARGET_LETTER:
+        go_to(c, one->about, x);
+        break;
+    case GAINS_LETTER:
+        copy(c->kp + task->first_row, x, task->rows);
+        copy(c->kv + task->first_row, x + task->rows, task->rows);
+        break;
+    case FORCE_LETTER:
+        copy(press_of(c, one->about) + PRESS_WANTED, x, task->rows);
+        break;
+    case MOVE_LETTER:
+        opspace_let_move(c, one->about, (int)x[0], x[1], x[2]);
+        break;
+    case SWAP_LETTER:
+        opspace_let_swap(c, one->about, (int)x[0], x[1], x[2]);
+        break;
+    case CONTACT_LETTER:
+        opspace_let_touch(c, one->about, x[0] != 0.0, x[1], x[2] != 0.0);
+        break;
+    default:
+        opspace_send(c->variable + one->about * VARIABLE_SIZE, x[0], x[1], x[2]);
     }
-    phase_at(x, t, &s, &rate, &acceleration);
-    if (!(s > 0.0 && s < 1.0)) {
-        double edge = fmin(fmax(s, 0.0), 1.0), cruise = (target - edge) / duration;
-        write_ramp(x, target, t, duration, edge, cruise, 0.0, 0.0, cruise);
-        return;
-    }
-    double blend = 0.5 * duration;
-    if (rate != 0.0)
-        blend = fmin(blend, 0.25 / fabs(rate));
-    if (acceleration != 0.0)
-        blend = fmin(blend, 1.0 / sqrt(fabs(acceleration)));
-    double covered = blend * (rate / 2.0 + blend * acceleration / 12.0);
-    double cruise = (target - s - covered) / (duration - 0.5 * blend);
-    write_ramp(x, target, t, duration, s, rate, acceleration, blend, cruise);
 }
 
 /* Do what is asked for; a letter that is being written waits for the next step. */
@@ -555,21 +626,7 @@ static void read_letters(opspace *c)
         letter *one = &c->ring[c->taken % LETTERS];
         if (__atomic_load_n(&one->turn, __ATOMIC_ACQUIRE) != c->taken + 1)
             return;
-        const opspace_task *task = &c->model->task[one->task];
-        switch (one->what) {
-        case TARGET_LETTER:
-            go_to(c, one->task, one->x);
-            break;
-        case GAINS_LETTER:
-            copy(c->kp + task->first_row, one->x, task->rows);
-            copy(c->kv + task->first_row, one->x + task->rows, task->rows);
-            break;
-        case FORCE_LETTER:
-            copy(press_of(c, one->task) + PRESS_WANTED, one->x, task->rows);
-            break;
-        default:
-            let_come_or_go(c, one->task, one->x[0], one->x[1], one->x[2]);
-        }
+        open_letter(c, one);
         __atomic_store_n(&one->turn, c->taken + LETTERS, __ATOMIC_RELEASE);
         c->taken++;
     }
@@ -585,7 +642,7 @@ void opspace_restart(opspace *c)
 const double *opspace_read(const opspace *c, const char *name, int64_t *count)
 {
     const opspace_field *one = find_field(c, name);
-    if (!one || one->whole)
+    if (!one || one->own)
         return NULL;
     if (count)
         *count = one->count;

@@ -1,9 +1,9 @@
 /* An exported controller of opspace: from time and state to torque, without Python.
  *
- * Link opspace.c, the file of the controller, the kernels and the mathematics library (-lm). Nothing
- * here locks, and only opspace_open allocates. Targets, gains, forces and what comes and goes may be
- * asked for from any thread at any time, and neither that thread nor the step waits; everything else
- * is for the thread that steps. Different controllers, also of one model, are independent. Units are SI
+ * Link the sources of the library, the file of the controller, the kernels and the mathematics library
+ * (-lm). Nothing here locks, and only opspace_open allocates. Targets, gains, forces, levels and what
+ * comes and goes may be asked for from any thread at any time, and neither that thread nor the step
+ * waits; everything else is for the thread that steps. Different controllers, also of one model, are independent. Units are SI
  * and radians, rotations 3 x 3 by rows.
  */
 #ifndef OPSPACE_H
@@ -26,14 +26,27 @@ typedef struct {
     int position;    /* numbers of a target: a position first, */
     int orientation; /* then a rotation; */
     int joints;      /* or joint positions */
+    int level;       /* where it is at first, a place in the levels of the model */
 } opspace_task;
+
+/* A contact, as it was exported. */
+typedef struct {
+    const char *name;
+    int there; /* at first */
+    int rows;
+    int body;
+    int joint;
+    int edges;   /* of its cone */
+    double most; /* largest normal force, N */
+    const double *numbers;
+} opspace_contact;
 
 /* An array that can be read. */
 typedef struct {
     const char *name;
     int64_t first; /* word where it begins */
     int64_t count;
-    int whole; /* numbers are int64_t, and only the library's own */
+    int own; /* only the library reads it */
 } opspace_field;
 
 typedef struct {
@@ -49,6 +62,15 @@ typedef struct {
     int tasks;
     const char *const *joint; /* names, in the order of v and tau */
     const opspace_task *task;
+    int moves;   /* changes of place that can be on their way at once */
+    int profile; /* of all transitions */
+    int levels;
+    const double *level; /* their numbers, the most important first */
+    int base;            /* coordinates without a motor */
+    int quaternions;
+    const int *quaternion; /* first coordinate of each */
+    int contacts;
+    const opspace_contact *contact;
     int fields;
     const opspace_field *field;
     double period; /* s, between two steps; 0 where none was announced */
@@ -77,7 +99,7 @@ void opspace_close(opspace *controller);
  * Where the robot adds the torque against gravity, tau is what it adds that to.
  * Returns what happened, a sum of OPSPACE_ statuses, 0 in an ordinary tick. With OPSPACE_FAULT tau is
  * the torque against the bias with joint damping. OPSPACE_NOT_FINITE, negative: time or state is not
- * finite, and tau is as it was; nor does it change with OPSPACE_NO_WRENCH, a force task that has never
+ * finite or a quaternion has no direction, and tau is as it was; nor does it change with OPSPACE_NO_WRENCH, a force task that has never
  * been given one. */
 int64_t opspace_step(opspace *controller, double t, const double *q, const double *v, double *tau);
 
@@ -120,6 +142,30 @@ int opspace_set_force(opspace *controller, int task, const double *force);
  * A task on its way turns without a step. The torque follows as smoothly as the profile that the task
  * was exported with. Returns 0, OPSPACE_NO_TASK or OPSPACE_REFUSED. */
 int opspace_set_presence(opspace *controller, int task, int present, double t, double duration);
+
+/* Move a task to another level from time t on, within so many seconds; it is never absent on the way.
+ *
+ * level is the number of one that the model was exported with; a task that is not there is at it at once.
+ * Asked again on the way it turns without a step. Returns 0, OPSPACE_NO_TASK or OPSPACE_REFUSED; or
+ * OPSPACE_BUSY: as many tasks are on their way to other levels as the model was exported for, and one
+ * has to arrive first. */
+int opspace_move(opspace *controller, int task, double level, double t, double duration);
+
+/* Exchange the levels of two tasks, as opspace_move; asked again on the way, it is turned around. */
+int opspace_swap(opspace *controller, int first, int second, double t, double duration);
+
+/* Number of a contact, or OPSPACE_NO_TASK. */
+int opspace_find_contact(const opspace *controller, const char *name);
+
+/* Let a contact come (present is 1) or go (0) from the next step on.
+ *
+ * One that goes waits for what the others can carry, or, where wait is 0, for nothing; so does a
+ * duration of 0. The robot must touch when it comes. Returns 0, OPSPACE_NO_TASK or OPSPACE_REFUSED. */
+int opspace_set_contact(opspace *controller, int contact, int present, double duration, int wait);
+
+/* Row of a contact in what opspace_read tells about contacts, or OPSPACE_NO_TASK while it is not
+ * there; for the thread that steps. */
+int opspace_contact_row(const opspace *controller, int contact);
 
 /* Multiply the presence of a task by an activation of one's own, from 0 to 1; from the thread that
  * steps.

@@ -1,0 +1,108 @@
+/* What the sources of the library share; see opspace.h for what programs use. */
+#ifndef OPSPACE_INSIDE_H
+#define OPSPACE_INSIDE_H
+
+#include "opspace.h"
+#include "opspace_layout.h"
+
+/* Joined sums would round otherwise than in Python. */
+#if defined(__clang__)
+#pragma STDC FP_CONTRACT OFF
+#elif defined(__GNUC__)
+#pragma GCC optimize("fp-contract=off")
+#endif
+
+/* What is asked for between two steps, from any thread: a ring of letters. Whoever writes one takes a
+ * number, which is the only thing that writers share, and says by it that the letter is there; the step
+ * takes letters in order up to the first that is not. Nobody waits for anybody. */
+enum { LETTERS = 64 };
+enum {
+    TARGET_LETTER,
+    GAINS_LETTER,
+    FORCE_LETTER,
+    PRESENCE_LETTER,
+    MOVE_LETTER,
+    SWAP_LETTER,
+    CONTACT_LETTER
+};
+
+typedef struct {
+    unsigned turn; /* the number of its writer while it is empty, one more while it is full */
+    int what;
+    int about; /* a task, or a contact */
+    double *x;
+} letter;
+
+/* A level at which a task is, or to which it is on its way. */
+typedef struct {
+    int level;  /* place in the table of levels */
+    int change; /* what brings it here; -1 of the first place */
+} place;
+
+/* A change of place in time; a swap has one for both tasks. */
+typedef struct {
+    int places; /* that it leads to; 0 is a free one */
+    int shared;
+    int variable; /* where the kernels have it; -1 is nowhere yet */
+    int64_t group;
+    double ramp[VARIABLE_SIZE];
+} change;
+
+/* How far a contact has come. */
+typedef struct {
+    int there;   /* whether it has come, or is on its way */
+    int waits;   /* a removal, for what the others can carry */
+    int waiting; /* now */
+    double progress, target, duration, highest, pace, calm;
+} footing;
+
+struct opspace {
+    const opspace_model *model;
+    uint64_t *words;
+    void *handle;
+    double *q, *v, *tau, *M, *bias, *torque_limit, *torque_middle, *option;
+    double *gravity, *variable, *own, *numbers, *goal, *kp, *kv, *press;
+    int64_t *kind, *endless, *group, *first_kept, *slots, *slot_on, *slot_off, *slot_place;
+    double *state, *last;
+    double before;
+    int begun, carried;
+    letter ring[LETTERS];
+    double *paper;
+    unsigned written, taken;
+    /* Where tasks are: places of each, one after the other, and the changes between them. */
+    place *place;
+    int *places;
+    change *change;
+    int room; /* changes that nobody has asked for */
+    /* What it touches: those that are there, in the order in which they came. */
+    footing *footing;
+    int *touching;
+    int touches;
+    double hindrance;
+    struct {
+        int64_t *count, *rows, *place, *edges;
+        double *numbers, *motion, *force, *most, *cone, *metric, *reference, *hindrance;
+    } stance;
+};
+
+/* opspace_ramps.c: activations in time. */
+double opspace_profile(int code, double s);
+int opspace_arrived(const double *ramp, double t);
+double opspace_activation(const double *ramp, double t);
+void opspace_rest(double *ramp, double profile, double target);
+void opspace_send(double *ramp, double target, double t, double duration);
+
+/* opspace_places.c: at which level tasks are. */
+int opspace_make_places(opspace *c);
+void opspace_pack_places(opspace *c);
+void opspace_let_move(opspace *c, int task, int level, double t, double duration);
+void opspace_let_swap(opspace *c, int first, int second, double t, double duration);
+void opspace_tidy_places(opspace *c, double t);
+
+/* opspace_contacts.c: what a robot with a floating base touches. */
+int opspace_make_contacts(opspace *c);
+void opspace_let_touch(opspace *c, int contact, int present, double duration, int waits);
+void opspace_move_contacts(opspace *c, double passed);
+int64_t opspace_touch(opspace *c);
+
+#endif

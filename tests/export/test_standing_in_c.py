@@ -1,0 +1,105 @@
+"""A robot that stands on contacts does so in C as in Python, to the last bit."""
+
+import numpy as np
+import pytest
+
+import opspace as osc
+from tests.controller.test_standing_compiled import ROBOTS
+from tests.export.in_c import InC, with_cc
+
+DT = 0.01
+
+
+def standing(name, **options):
+    """A robot on all contacts that it may have, and its tasks with targets that stay."""
+    tasks, contacts, other = ROBOTS[name]()
+    robot = osc.load_robot(name)
+    controller = osc.Controller(
+        robot,
+        osc.Stack(tasks, osc.JointLimits(), [*contacts, other]),
+        torque_limits="priority",
+        period=DT,
+        **options,
+    )
+    robot.update(robot.q_reference, np.zeros(robot.nv))
+    for task in controller.stack:
+        if isinstance(task, osc.ComTask):
+            task.target = robot.com_position()
+        elif isinstance(task, osc.PositionTask):
+            task.target = task.source.measure(robot).position
+        elif isinstance(task, osc.OrientationTask):
+            task.target = task.source.measure(robot).rotation
+        elif isinstance(task, osc.PostureTask):
+            task.target = robot.q_reference[7:]
+    return controller, contacts, other
+
+
+def states(robot, count, spread, seed=0):
+    chance = np.random.default_rng(seed)
+    for k in range(count):
+        v = spread * chance.normal(size=robot.nv)
+        q = robot.integrate(robot.q_reference, spread * chance.normal(size=robot.nv), 0.2)
+        q[3:7] *= 1.0 + 0.1 * chance.random()  # which the tick takes as a direction
+        yield k, DT * k, q, v
+
+
+@with_cc
+@pytest.mark.parametrize("name", ["solo12", "talos"])
+def test_contacts_come_and_go_as_in_a_stack(name, tmp_path):
+    controller, (first, *_), other = standing(name)
+    controller.stack.remove(other, duration=0.0)
+    c = InC(tmp_path, standing(name)[0], absent=[other.name])
+    stack, statuses = controller.stack, set()
+    for k, t, q, v in states(controller.robot, 120, 0.02):
+        if k == 5:
+            stack.insert(other, 0.1)
+            assert c.touch(other, 1, 0.1) == 0
+        if k == 30:
+            stack.remove(first, duration=0.3)
+            assert c.touch(first, 0, 0.3) == 0
+        if k == 40:  # turned on its way
+            stack.insert(first, 0.2)
+            assert c.touch(first, 1, 0.2) == 0
+        if k == 70:
+            stack.remove(other, duration=0.1, wait=False)
+            assert c.touch(other, 0, 0.1, wait=False) == 0
+        if k == 90:  # all that carries
+            stack.remove(first, duration=0.1)
+            assert c.touch(first, 0, 0.1) == 0
+        command, (status, tau) = controller.step(t, q, v), c.step(t, q, v)
+        np.testing.assert_array_equal(tau, command.tau, err_msg=f"tick {k}")
+        assert status == command.status
+        assert [c.contact_row(one) for one in (first, other)] == [
+            list(command.contacts).index(one.name) if one.name in command.contacts else -2
+            for one in (first, other)
+        ]
+        statuses.add(status)
+    assert any(status & osc.Status.CONTACT_WAITS for status in statuses)
+
+
+@with_cc
+def test_a_tick_that_fails_brakes_from_the_torque_that_carried(tmp_path):
+    controller, _, _ = standing("solo12")
+    c = InC(tmp_path, standing("solo12")[0])
+    for k, t, q, v in states(controller.robot, 8, 0.02):
+        if k in (3, 6):
+            v[8] = 1e200
+        command, (status, tau) = controller.step(t, q, v), c.step(t, q, v)
+        np.testing.assert_array_equal(tau, command.tau, err_msg=f"tick {k}")
+        assert status == command.status
+    assert c.step(1.0, np.zeros(controller.robot.nq), v)[0] == -1, (
+        "a quaternion without a direction"
+    )
+
+
+def test_what_only_python_can_do_is_refused_by_name(tmp_path):
+    controller, (first, *_), _ = standing("solo12", falling=osc.FallRule())
+    with pytest.raises(osc.InputError, match="a rule of falling"):
+        osc.export_c(controller, tmp_path)
+    controller, (first, *_), _ = standing("solo12")
+    with pytest.raises(osc.UnknownNameError, match="contact"):
+        osc.export_c(controller, tmp_path, absent=["foot"])
+    first.activation = lambda robot, t: 1.0
+    with pytest.raises(osc.InputError, match=f"activation of '{first.name}'"):
+        osc.export_c(controller, tmp_path)
+    assert not list(tmp_path.iterdir())
