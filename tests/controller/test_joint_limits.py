@@ -212,6 +212,10 @@ def test_bad_limits_are_refused(robot):
         JointLimits(brake_acceleration=-1.0)
     with pytest.raises(InputError, match=r"joint limits of 'joint1' must be \(lower, upper\)"):
         JointLimits(joints={"joint1": (1.0, 0.0)})
+    with pytest.raises(InputError, match=r"speeds must be given by joint name, got 1\.5"):
+        JointLimits(speeds=1.5)
+    with pytest.raises(InputError, match="joints must be given by joint name"):
+        JointLimits(joints=[(0.0, 1.0)])
     with pytest.raises(UnknownNameError, match=r"joint 'joint7'.*joint6"):
         Controller(robot, Stack([JointLimits(joints={"joint7": (0.0, 1.0)})]))
 

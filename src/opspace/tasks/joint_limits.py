@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from types import MappingProxyType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar, cast
 
 import numpy as np
 
@@ -19,6 +19,7 @@ from opspace.tasks.validation import Array
 if TYPE_CHECKING:
     from opspace.robots.protocol import Robot
 
+T = TypeVar("T")
 OWN_SPEEDS: Mapping[str, float] = MappingProxyType({})
 """The speed limits of the robot, none of them replaced."""
 
@@ -130,9 +131,10 @@ class JointLimits(KnownAttributes):
         self.law = LIMIT_LAWS[mode]
         self.profile = profile
         self.brake_acceleration = brake_acceleration
-        self._joints = {name: _pair(name, limits) for name, limits in (joints or {}).items()}
+        ranges, largest = _by_joint("joints", joints), _by_joint("speeds", speeds)
+        self._joints = {name: _pair(name, limits) for name, limits in ranges.items()}
         self._limits_speed = speeds is not None and LIMIT_LAWS[mode].bound
-        self._speeds = {name: _speed(name, speed) for name, speed in (speeds or {}).items()}
+        self._speeds = {name: _speed(name, speed) for name, speed in largest.items()}
         self.sides: tuple[Side, ...] = ()
 
     def __repr__(self) -> str:
@@ -287,6 +289,13 @@ class JointLimits(KnownAttributes):
             getattr(type(self), name) is not getattr(JointLimits, name)
             for name in ("admissible", "presence", "margin", "hurry")
         )
+
+
+def _by_joint(what: str, given: Mapping[str, T] | None) -> Mapping[str, T]:
+    found: object = {} if given is None else given
+    if not isinstance(found, Mapping):
+        raise InputError(f"joint limits: {what} must be given by joint name, got {found!r}")
+    return cast("Mapping[str, T]", found)
 
 
 def _speed(name: str, speed: float) -> float:
