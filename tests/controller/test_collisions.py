@@ -273,7 +273,7 @@ def test_what_cannot_be_used_is_refused_by_name():
         arm(osc.Controller, collisions=osc.Box((1, 1, 1)))
     controller, guard = arm(osc.Controller)
     with pytest.raises(osc.InputError, match="cannot have collisions"):
-        exported(controller, (), "quintic")
+        exported(controller, (), "quintic", (), 0)
     with pytest.raises(osc.InputError, match="puma560"):
         arm(osc.Controller, collisions=guard)
 

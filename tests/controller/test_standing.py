@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 import opspace as osc
-from opspace.controller.exported import exported
 from opspace.controller.reference import ReferenceController
 from opspace.errors import InputError
 
@@ -224,5 +223,3 @@ def test_what_makes_no_sense_is_refused(g1):
             controller_of(g1, **option)
     with pytest.raises(osc.UnknownNameError, match="sole"):
         controller_of(g1, contacts=[osc.SoleContact("sole", HALF)])
-    with pytest.raises(InputError, match="exported controller cannot have a floating base"):
-        exported(controller_of(g1), (), "quintic")
