@@ -144,3 +144,26 @@ def test_as_printed_jumps_where_the_compensated_law_does_not():
     compensated = [jump_at_zero("compensated", seed) for seed in range(400)]
     assert np.median(printed) > 0.5
     assert max(compensated) < 1e-9
+
+
+@MANY
+@given(
+    seed=SEEDS, above=st.integers(0, 2), rows=st.integers(1, 3), more=st.integers(1, 3),
+    near=st.sampled_from([0.0, 1e-13, 1e-11]),
+)  # fmt: skip
+def test_rows_that_depend_on_each_other_ask_for_what_their_independent_ones_do(
+    seed, above, rows, more, near
+):
+    """To within rounding, too: what tells such rows apart is no direction of its own."""
+    rng = np.random.default_rng(seed)
+    printed = Printed(seed, [rows], 3)
+    A, J, f = printed.A, printed.J[0], printed.f[0]
+    mix = np.concatenate([np.eye(rows), rng.normal(size=(more, rows))])
+    first = TaskSet(rng.normal(size=(above, printed.n)), rng.normal(size=above), 0)
+    mixed = mix @ J + near * rng.normal(size=(rows + more, printed.n))
+    last = TaskSet(np.eye(printed.n), np.ones(printed.n), 2)
+    alone, together = (
+        task_torque(A, [first, TaskSet(one, wish, 1), last])
+        for one, wish in ((J, f), (mixed, mix @ f))
+    )
+    np.testing.assert_allclose(together, alone, rtol=1e-6, atol=1e-6 * np.abs(alone).max())
