@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from jaxtyping import Float, TypeCheckError
 
-from opspace.law.hierarchy import WhitenedTask, stack_rows, start
+from opspace.law.hierarchy import WhitenedTask, solve_level, stack_rows, start
 from tests.shapes import check, checked, form
 
 
@@ -14,7 +14,7 @@ def test_arguments_that_do_not_fit_together_are_found():
     assert (J.shape, f.shape) == ((4, 3), (4,))
     assert stack_rows([fitting, fitting], {0, 1})[0].shape == (4, 3)
     with pytest.raises(TypeCheckError):
-        WhitenedTask(np.zeros((2, 3)), np.zeros(3))
+        solve_level(np.zeros((2, 3)), np.zeros(3), start(3))
     assert start(3).u.shape == (3,)
     with pytest.raises(TypeCheckError):
         start(3.0)
