@@ -294,9 +294,12 @@ int64_t opspace_step(opspace *c, double t, const double *q, const double *v, dou
         read_letters(c);
         return OPSPACE_NO_WRENCH;
     }
+    if (c->paused)
+        opspace_pause(c, t - c->before);
+    c->paused = 0;
     opspace_move_contacts(c, c->begun ? fmax(0.0, t - c->before) : 0.0);
     read_letters(c);
-    opspace_tidy_places(c, t);
+    opspace_start_timed(c, t);
     int64_t found = watch(c, t, c->state, v);
     c->before = t;
     c->begun = 1;
@@ -605,28 +608,23 @@ static void open_letter(opspace *c, const letter *one)
     case FORCE_LETTER:
         copy(press_of(c, one->about) + PRESS_WANTED, x, task->rows);
         break;
-    case MOVE_LETTER:
-        opspace_let_move(c, one->about, (int)x[0], x[1], x[2]);
-        break;
-    case SWAP_LETTER:
-        opspace_let_swap(c, one->about, (int)x[0], x[1], x[2]);
-        break;
-    case CONTACT_LETTER:
-        opspace_let_touch(c, one->about, x[0] != 0.0, x[1], x[2] != 0.0);
-        break;
     default:
-        opspace_send(c->variable + one->about * VARIABLE_SIZE, x[0], x[1], x[2]);
+        opspace_let_touch(c, one->about, x[0] != 0.0, x[1], x[2] != 0.0);
     }
 }
 
-/* Do what is asked for; a letter that is being written waits for the next step. */
+/* Take what is asked for; a letter that is being written waits for the next step, and so does one with
+ * a time where all that wait for theirs are too many. */
 static void read_letters(opspace *c)
 {
     for (int i = 0; i < LETTERS; i++) {
         letter *one = &c->ring[c->taken % LETTERS];
         if (__atomic_load_n(&one->turn, __ATOMIC_ACQUIRE) != c->taken + 1)
             return;
-        open_letter(c, one);
+        if (!opspace_has_time(one->what))
+            open_letter(c, one);
+        else if (!opspace_let_wait(c, one))
+            return;
         __atomic_store_n(&one->turn, c->taken + LETTERS, __ATOMIC_RELEASE);
         c->taken++;
     }
@@ -634,6 +632,8 @@ static void read_letters(opspace *c)
 
 void opspace_restart(opspace *c)
 {
+    read_letters(c); /* the times of what was asked for until now are the old clock's */
+    c->paused |= c->begun;
     c->begun = 0;
     for (int i = 0; i < c->model->tasks; i++)
         c->kind[i * KIND_SIZE + KIND_REMEMBERS] = 0;
