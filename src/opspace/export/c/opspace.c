@@ -296,8 +296,9 @@ int64_t opspace_step(opspace *c, double t, const double *q, const double *v, dou
     }
     if (c->paused)
         opspace_pause(c, t - c->before);
+    else
+        opspace_move_contacts(c, c->begun ? fmax(0.0, t - c->before) : 0.0);
     c->paused = 0;
-    opspace_move_contacts(c, c->begun ? fmax(0.0, t - c->before) : 0.0);
     read_letters(c);
     opspace_start_timed(c, t);
     int64_t found = watch(c, t, c->state, v);
@@ -632,8 +633,12 @@ static void read_letters(opspace *c)
 
 void opspace_restart(opspace *c)
 {
-    read_letters(c); /* the times of what was asked for until now are the old clock's */
-    c->paused |= c->begun;
+    if (c->begun) {
+        /* What was asked for until now comes after this step of the contacts, by the old clock. */
+        opspace_move_contacts(c, 0.0);
+        read_letters(c);
+        c->paused = 1;
+    }
     c->begun = 0;
     for (int i = 0; i < c->model->tasks; i++)
         c->kind[i * KIND_SIZE + KIND_REMEMBERS] = 0;
