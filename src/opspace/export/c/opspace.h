@@ -3,8 +3,8 @@
  * Link the sources of the library, the file of the controller, the kernels and the mathematics library
  * (-lm). Nothing here locks, and only opspace_open allocates. Targets, gains, forces, levels and what
  * comes and goes may be asked for from any thread at any time, and neither that thread nor the step
- * waits; everything else is for the thread that steps. Different controllers, also of one model, are independent. Units are SI
- * and radians, rotations 3 x 3 by rows.
+ * waits; everything else is for the thread that steps. Different controllers, also of one model, are
+ * independent. Units are SI and radians, rotations 3 x 3 by rows.
  */
 #ifndef OPSPACE_H
 #define OPSPACE_H
@@ -99,8 +99,8 @@ void opspace_close(opspace *controller);
  * Where the robot adds the torque against gravity, tau is what it adds that to.
  * Returns what happened, a sum of OPSPACE_ statuses, 0 in an ordinary tick. With OPSPACE_FAULT tau is
  * the torque against the bias with joint damping. OPSPACE_NOT_FINITE, negative: time or state is not
- * finite or a quaternion has no direction, and tau is as it was; nor does it change with OPSPACE_NO_WRENCH, a force task that has never
- * been given one. */
+ * finite or a quaternion has no direction, and tau is as it was; nor does it change with
+ * OPSPACE_NO_WRENCH, a force task that has never been given one. */
 int64_t opspace_step(opspace *controller, double t, const double *q, const double *v, double *tau);
 
 /* Number of a task, or OPSPACE_NO_TASK. */
@@ -141,8 +141,9 @@ int opspace_set_force(opspace *controller, int task, const double *force);
 /* Let a task come (present is 1) or go (0) from time t on, for so many seconds.
  *
  * It waits for a time that is to come, and begins with the next step where t is not after the step
- * before, so that nobody who asks late asks for a step in the torque. A task on its way turns. The torque follows as smoothly as the profile that the task
- * was exported with. Returns 0, OPSPACE_NO_TASK or OPSPACE_REFUSED. */
+ * before, so that nobody who asks late asks for a step in the torque. A task on its way turns. The torque
+ * follows as smoothly as the profile that the task was exported with. Returns 0, OPSPACE_NO_TASK or
+ * OPSPACE_REFUSED. */
 int opspace_set_presence(opspace *controller, int task, int present, double t, double duration);
 
 /* Move a task to another level from time t on, within so many seconds; it is never absent on the way.

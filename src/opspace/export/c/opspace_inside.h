@@ -95,6 +95,16 @@ struct opspace {
     } stance;
 };
 
+/* opspace.c: tasks, and numbers. */
+const opspace_task *opspace_task_at(const opspace *c, int task);
+double *opspace_press_of(const opspace *c, int task);
+int opspace_all_finite(const double *x, int count);
+void opspace_copy(double *to, const double *from, int count);
+
+/* opspace_wishes.c: letters. */
+int opspace_make_ring(opspace *c);
+void opspace_read_letters(opspace *c);
+
 /* opspace_ramps.c: activations in time. */
 double opspace_profile(int code, double s);
 int opspace_arrived(const double *ramp, double t);
