@@ -119,17 +119,22 @@ def test_what_was_on_its_way_goes_on_as_if_there_had_been_no_pause(kind, pause):
 
 
 @KINDS
-def test_what_is_asked_after_the_pause_is_in_the_new_time(kind):
+@pytest.mark.parametrize("ticks", [0, 1])
+@pytest.mark.parametrize("before", [-5.0, 5.0])
+def test_what_is_asked_after_the_pause_is_in_the_new_time(kind, before, ticks):
     arm, controller = Arm(), holding(kind)
-    arm.drive(controller, 5.0, 20)
+    arm.drive(controller, before, 20)
+    controller.stack.remove("posture", 0.01, start_time=before + 0.03)  # which waits on
     controller.restart()
-    arm.drive(controller, 0.0, 1)
+    arm.drive(controller, 0.0, ticks)
     guest = osc.JointTask("joint3")
     controller.stack.insert(guest, 0.5, 0.01, start_time=0.005)
-    found = arm.drive(controller, DT, 20)
+    found = arm.drive(controller, DT * ticks, 30)
     present = [guest.name in command.tasks for command in found]
-    assert present.index(True) == 4
+    assert present.index(True) == 5 - ticks
     assert found[-1].tasks[guest.name].activation == 1.0
+    going = [command.tasks["posture"].activation < 1.0 for command in found[:15]]
+    assert going.index(True) == 12 - ticks  # eleven ticks of waiting, and the one that begins
 
 
 @KINDS

@@ -114,8 +114,8 @@ def test_the_programs_are_found():
     found = {name_of(page) for page in WITH_PROGRAMS}
     assert {"README.md", "docs/theory.md", "docs/tutorial.md", "docs/how-to/mujoco.md"} <= found
     unknown = {block.language for page in PAGES for block in blocks_of(page)}
-    # Patches are applied by test_worked_examples, C and C++ compiled by export/test_c_library.
-    assert unknown <= {"python", "sh", "yaml", "xml", "text", "diff", "c", "cpp", "cmake"}
+    # Patches are applied and used by test_worked_examples, C is compiled by export/test_c_library.
+    assert unknown <= {"python", "sh", "yaml", "xml", "text", "diff", "c", "cmake"}
 
 
 def parse_opspace(words):
@@ -141,8 +141,8 @@ def check_command(line):
         assert asked, line
         extras = metadata.metadata("opspace").get_all("Provides-Extra", [])
         assert set((asked[1] or "all").split(",")) <= set(extras), line
-    elif words[0] in ("cc", "c++"):  # export/test_c_library compiles the programs
-        assert words[-1] in ("hold", "arm/opspace*.c", "franka"), line
+    elif words[0] in {"cc", "c++"}:  # run by export/test_c_library
+        assert words[-1] in {"hold", "arm/opspace*.c", "franka"}, line
     elif words[:2] == ["python", "-m"]:
         importlib.import_module(words[2]).parser().parse_args(words[3:])
     elif words[0] == "python":

@@ -66,3 +66,9 @@ def test_a_reflex_ends_the_loop_with_its_name_and_nothing_is_asked_afterwards(mo
     assert client.calls[-3:] == ["read", "reflex", "stop"]
     with pytest.raises(osc.RobotStoppedError, match="joint_velocity_violation"):
         driver.read(1.0)
+    client.time, client.calls = 0.0, []  # recovered, and begun again
+    driver.start()
+    assert driver.read(1.0).t == pytest.approx(1e-3)
+    driver.write(np.zeros(7))
+    driver.stop()
+    assert client.calls == ["read", "write", "write", "stop"]

@@ -12,6 +12,7 @@ import pytest
 import opspace as osc
 from opspace.errors import RecordingError
 from opspace.loop.shared_history import HistoryFollower
+from opspace.runs import loop_recorder
 from tests.drivers.test_robot_apart import N, arm, driver_of, robot_apart
 
 
@@ -71,6 +72,10 @@ def test_what_is_overwritten_before_it_is_read_is_counted(tmp_path):
     assert found.rows[:, 0].tolist() == list(range(23, 29))  # 22 may be on its way to be 30
     assert found.lost == 21
     assert follower.more(ended=True).rows[:, 0].tolist() == [29.0]
+    for k in range(30, 38):
+        add(history, k)
+    found = follower.more(ended=True)  # nobody writes any more: the oldest is whole, too
+    assert (found.rows[:, 0].tolist(), found.lost) == (list(range(30, 38)), 0)
     assert follower.end is None
     history.end("stopped", "größer als erlaubt")
     assert follower.end == ("stopped", "größer als erlaubt")
@@ -95,6 +100,57 @@ def test_a_file_of_somebody_else_is_refused(tmp_path):
     with pytest.raises(RecordingError, match="already holds a recording"):
         osc.LoopRecorder(history, controller, tmp_path / "run")
     assert osc.load(tmp_path / "run").ended.reason == "nobody wanted more of it"
+    history.close()
+
+
+def test_a_history_is_closed_once_and_a_broken_one_is_refused(tmp_path):
+    history, follower = followed(tmp_path, 8)
+    add(history, 0)
+    history.close()
+    with (tmp_path / "cycles").open("w+b") as another:  # which may have the number of its file
+        history.close()
+        another.write(b"OSC_HIST" + bytes(8 * 70))
+        another.flush()
+        with pytest.raises(osc.InputError, match="is not the history"):
+            HistoryFollower(tmp_path / "cycles")
+    assert follower.more(ended=True).rows[:, 0].tolist() == [0.0]
+    with pytest.raises(FileNotFoundError):
+        osc.SharedHistory(tmp_path / "nowhere" / "cycles", osc.load_robot("puma560"))
+
+
+def test_cycles_that_are_lost_are_warned_of(tmp_path, caplog):
+    history, _ = followed(tmp_path, 8)
+    for k in range(30):
+        add(history, k)
+    history.end("completed", "")
+    recorder = osc.LoopRecorder(history, arm()[0], tmp_path / "run")
+    recorder.close()
+    recorder.close()
+    recording = osc.load(tmp_path / "run")
+    assert recording.t.tolist() == list(range(22, 30))
+    assert recording.ended.reason == "22 cycles were overwritten before they were read"
+    assert recording.ended.reason in caplog.text
+    history.close()
+
+
+def test_a_process_that_records_and_does_not_begin_or_end_is_told_by_name(tmp_path, monkeypatch):
+    history, _ = followed(tmp_path, 8)
+    controller = arm()[0]
+    with pytest.raises(osc.InputError, match="header cannot be written down"):
+        osc.LoopRecorder(history, controller, tmp_path / "run", {"robot": object()})
+    with monkeypatch.context() as patch:
+        patch.setattr(loop_recorder, "STARTING", 0.0)
+        with pytest.raises(RecordingError, match="did not begin within 0 s"):
+            osc.LoopRecorder(history, controller, tmp_path / "run")
+    recorder = osc.LoopRecorder(history, controller, tmp_path / "other")
+    os.kill(recorder.pid, signal.SIGSTOP)
+    with monkeypatch.context() as patch:
+        patch.setattr(loop_recorder, "ENDING", 0.1)
+        with pytest.raises(RecordingError, match="still writes after"):
+            recorder.close()
+    os.kill(recorder.pid, signal.SIGCONT)
+    recorder.close()
+    assert osc.load(tmp_path / "other").ended.how == "stopped"
     history.close()
 
 

@@ -101,3 +101,21 @@ def test_what_the_states_lack_is_named():
             driver.read(10.0)
         driver.stop()
         driver.stop()
+
+
+def test_a_driver_that_is_stopped_leaves_whether_ros_goes_on_or_not_and_begins_again():
+    from opspace.drivers.ros2 import Ros2Driver
+
+    with Arm() as arm:
+        driver = Ros2Driver(arm.robot.joint_names, facts=FACTS)
+        driver.start()
+        assert driver.read(10.0) is not None
+        driver.stop()
+        driver.start()
+        assert driver.read(10.0) is not None
+        driver._context.shutdown()
+        with pytest.raises(osc.RobotStoppedError, match="ROS 2 is shut down"):
+            driver.read(10.0)
+        driver.stop()
+        driver.start()
+        driver.stop()

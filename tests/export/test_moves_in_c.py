@@ -31,11 +31,22 @@ class Both:
         self.controller, self.tasks = four()
         self.stack = self.controller.stack
         self.c = InC(folder, self.controller, **options)
-        self.chance, self.k = np.random.default_rng(0), 0
+        self.chance, self.k, self.clock = np.random.default_rng(0), 0, 0.0
 
     @property
     def t(self):
-        return DT * self.k
+        return DT * self.k + self.clock
+
+    def restart(self, clock):
+        """Go on with a clock that is so far from the one before."""
+        self.controller.restart()
+        self.c.library.opspace_restart(self.c.own)
+        self.clock += clock
+        self.run(1)
+
+    def leave(self, i, duration):
+        self.stack.remove(self.tasks[i], duration=duration, start_time=self.t)
+        assert self.c.set("presence", self.tasks[i], 0, self.t, duration) == 0
 
     def move(self, i, level, duration):
         self.stack.move(self.tasks[i], level, duration)
@@ -82,26 +93,75 @@ def test_tasks_move_and_swap_as_in_a_stack(tmp_path):
 
 @with_cc
 @pytest.mark.parametrize("seed", range(3))
-def test_whatever_is_asked_for_comes_out_the_same(seed, tmp_path):
+def test_whatever_is_asked_for_at_any_time_comes_out_the_same(seed, tmp_path):
     both, chance = Both(tmp_path, levels=[-1, 0.5], moves=4), np.random.default_rng(seed)
     levels = [-1, 0, 0.5, 1, 2, 3]
     for _ in range(40):
-        duration = float(chance.choice([0.0, 0.01, 0.03]))
-        i, j = chance.permutation(4)[:2].tolist()
+        duration = float(chance.choice([0.0, 0.01, 0.0137, 0.03]))
+        start = both.t + float(chance.choice([0.0, 0.0, -0.004, -0.0003, 0.0003, 0.0124]))
+        i, j = chance.permutation(3)[:2].tolist()
         if chance.random() < 0.4:
-            answer = both.c.swap(both.tasks[i], both.tasks[j], both.t, duration)
+            answer = both.c.swap(both.tasks[i], both.tasks[j], start, duration)
             if answer == 0:
-                both.stack.swap(both.tasks[i], both.tasks[j], duration)
+                both.stack.swap(both.tasks[i], both.tasks[j], duration, start_time=start)
         else:
             level = float(chance.choice(levels))
-            answer = both.c.move(both.tasks[i], level, both.t, duration)
+            answer = both.c.move(both.tasks[i], level, start, duration)
             if answer == 0:
-                both.stack.move(both.tasks[i], level, duration)
+                both.stack.move(both.tasks[i], level, duration, start_time=start)
         assert answer in (0, -5)
         both.run(int(chance.integers(0, 15)))
+        if chance.random() < 0.1:
+            both.restart(float(chance.choice([-0.2, 0.5, 7.25])))
     both.run(60)
     # All have arrived, and every change can be asked for again.
     assert both.c.move(both.tasks[0], -1, both.t, 0.01) == 0
+
+
+@with_cc
+def test_what_is_asked_for_later_hurries_nobody(tmp_path):
+    both = Both(tmp_path, levels=[-1], moves=2)
+    both.run(3)
+    both.move(0, 2, 0.03)
+    both.leave(3, 0.03)
+    both.run(5)
+    both.stack.move(both.tasks[2], -1, 0.01, start_time=both.t + 0.05)
+    assert both.c.move(both.tasks[2], -1, both.t + 0.05, 0.01) == 0
+    both.run(5)
+    both.restart(-1.0)  # it waits on, and tasks go on from where they were
+    assert both.run(80) > 1.0
+
+
+@with_cc
+def test_wishes_for_times_to_come_are_counted_and_none_is_lost(tmp_path):
+    both = Both(tmp_path)
+    other = both.tasks[1]
+    for _ in range(2):  # those that wait for their time, then those that wait for a step
+        for k in range(64):
+            assert both.c.set("presence", other, k % 2, 0.1, 0.01) == 0
+        both.c.step(both.t, both.controller.robot.q_reference, np.zeros(6))
+    assert both.c.set("presence", other, 0, 0.1, 0.01) == -5
+    both.c.step(0.1, both.controller.robot.q_reference, np.zeros(6))
+    both.c.step(0.2, both.controller.robot.q_reference, np.zeros(6))
+    assert both.c.set("presence", other, 0, 0.2, 0.01) == 0
+    assert both.c.read("h")[1] == 1.0, "the last wish of each"
+
+
+@with_cc
+def test_durations_and_times_without_sense_are_refused_and_huge_ones_are_taken(tmp_path):
+    both = Both(tmp_path)
+    both.run(2)
+    for t, duration in ((np.nan, 1.0), (np.inf, 1.0), (0.0, np.nan), (0.0, np.inf), (0.0, -1e-9)):
+        assert both.c.move(both.tasks[0], 1, t, duration) == -3
+        assert both.c.swap(both.tasks[0], both.tasks[1], t, duration) == -3
+        assert both.c.set("presence", both.tasks[0], 0, t, duration) == -3
+    for i in (-1, 4, 2**31 - 1):
+        assert both.c._call("move", i, 1.0, 0.0, 1.0) == -2
+        assert both.c._call("swap", 0, i, 0.0, 1.0) == -2
+        assert both.c._call("set_presence", i, 0, 0.0, 1.0) == -2
+    both.move(0, 2, 1e300)
+    both.swap(1, 2, 1e-300)
+    both.run(5)
 
 
 @with_cc

@@ -30,16 +30,17 @@ static void ask(opspace *c, double t)
 {
     const opspace_model *m = &controller;
     double level = m->level[one_of(m->levels)], duration = 0.01 * one_of(5);
+    double start = t + 0.005 * (one_of(7) - 3);
     int first = one_of(m->tasks), second = one_of(m->tasks);
     switch (one_of(4)) {
     case 0:
-        opspace_move(c, first, level, t, duration);
+        opspace_move(c, first, level, start, duration);
         break;
     case 1:
-        opspace_swap(c, first, second, t, duration);
+        opspace_swap(c, first, second, start, duration);
         break;
     case 2:
-        opspace_set_presence(c, first, one_of(2), t, duration);
+        opspace_set_presence(c, first, one_of(2), start, duration);
         break;
     default:
         opspace_set_contact(c, one_of(m->contacts + 1), one_of(2), duration, one_of(2));

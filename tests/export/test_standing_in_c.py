@@ -78,6 +78,31 @@ def test_contacts_come_and_go_as_in_a_stack(name, tmp_path):
 
 
 @with_cc
+def test_a_restart_finds_contacts_where_they_were(tmp_path):
+    controller, (first, second, *_), _ = standing("solo12")
+    c, clock, statuses = InC(tmp_path, standing("solo12")[0]), 0.0, 0
+    for k, t, q, v in states(controller.robot, 60, 0.02):
+        if k == 10:
+            controller.stack.remove(first, duration=0.1)
+            assert c.touch(first, 0, 0.1) == 0
+        if k in (16, 20):  # with a wish that nobody has read yet
+            one, come = (second, 0) if k == 16 else (first, 1)
+            if come:
+                controller.stack.insert(one, 0.1)
+            else:
+                controller.stack.remove(one, duration=0.1)
+            assert c.touch(one, come, 0.1) == 0
+            controller.restart()
+            c.library.opspace_restart(c.own)
+            clock += 5.0 if come else -3.0
+        command, (status, tau) = controller.step(t + clock, q, v), c.step(t + clock, q, v)
+        np.testing.assert_array_equal(tau, command.tau, err_msg=f"tick {k}")
+        assert status == command.status
+        statuses |= status
+    assert statuses & osc.Status.CONTACT_WAITS
+
+
+@with_cc
 def test_a_tick_that_fails_brakes_from_the_torque_that_carried(tmp_path):
     controller, _, _ = standing("solo12")
     c = InC(tmp_path, standing("solo12")[0])

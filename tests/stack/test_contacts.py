@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 
 import opspace as osc
 from opspace.errors import InputError, UnknownNameError
-from opspace.stack.contact_course import MOTION_PART
+from opspace.stack.changes import Timing
+from opspace.stack.contact_course import MOTION_PART, ContactCourse
 
 DT = 0.01
 
@@ -209,3 +210,18 @@ def test_requests_come_from_any_thread():
 def test_it_says_what_it_touches():
     assert "contacts: foot" in repr(stack_of(sole()))
     assert repr(sole()) == "SoleContact('foot', friction=0.5)"
+
+
+@pytest.mark.parametrize("pause", [-7.0, 7.0])
+def test_what_waits_for_its_time_waits_on_and_what_is_asked_in_a_pause_is_in_the_new_time(pause):
+    left, right, course = osc.PointContact("left"), osc.PointContact("right"), ContactCourse()
+    course.start_with(left)
+    course.begin_tick(5.0)
+    course.remove(left, Timing(0.0, start_time=5.5), wait=False)
+    course.resume()
+    course.insert(right, Timing(0.0, start_time=5.25 + pause))
+    present = [
+        [member.contact.name for member in course.begin_tick(5.0 + 0.125 * k + pause)]
+        for k in range(6)
+    ]
+    assert present == [["left"]] * 2 + [["left", "right"]] * 2 + [["right"]] * 2

@@ -80,6 +80,7 @@ class FrankaDriver:
         """
         kinds = self._library.RealtimeConfig
         config = kinds.kEnforce if self._real_time else kinds.kIgnore
+        self._ended = ""
         with self._told():
             self._robot = self._library.Robot(self._host, config)
             if self._collision is not None:

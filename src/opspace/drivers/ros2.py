@@ -58,6 +58,8 @@ class Ros2Driver:
         self._joints, self._topics = tuple(joints), (states, commands)
         self._context: Any = None
         self._node: Any = None
+        self._publisher: Any = None
+        self._executor: Any = None
         self._heard: Any = None
 
     def start(self) -> None:
@@ -117,8 +119,11 @@ class Ros2Driver:
         """Command nothing more: zeros once, which is for a robot that brakes by itself, and leave."""
         if self._context is None:
             return
-        if self._context.ok():
+        if self._publisher is not None and self._context.ok():
             self.write(np.zeros(len(self._joints)))
+        if self._executor is not None:
+            self._executor.shutdown()
+        if self._node is not None:
             self._node.destroy_node()
-            self._ros.shutdown(context=self._context)
-        self._context = None
+        self._context.try_shutdown()
+        self._context = self._node = self._publisher = self._executor = None

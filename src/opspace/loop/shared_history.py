@@ -58,11 +58,16 @@ class SharedHistory(History):
         unfinished = self.path.with_name(f"{self.path.name}.{os.getpid()}")
         head = np.zeros(WORDS, np.int64)
         head[: NUMBERS - 1] = MAGIC, robot.nq, robot.nv, rows
-        unfinished.write_bytes(head.tobytes() + self.rows.tobytes())
-        self._file = os.open(unfinished, os.O_RDWR)
-        _take(self._file)
-        unfinished.replace(self.path)
-        words = np.frombuffer(mmap.mmap(self._file, size), np.int64)
+        self._file: int | None = None
+        try:
+            unfinished.write_bytes(head.tobytes() + self.rows.tobytes())
+            file = self._file = os.open(unfinished, os.O_RDWR)
+            _take(file)
+            unfinished.replace(self.path)
+        except OSError:
+            unfinished.unlink(missing_ok=True)
+            raise
+        words = np.frombuffer(mmap.mmap(file, size), np.int64)
         self._end, self._reason = words[NUMBERS - 1 : NUMBERS], words[REASON:WORDS]
         self.whole = words[NUMBERS : NUMBERS + WHOLES]
         self.rows = words[WORDS:].view(np.float64).reshape(self.rows.shape)
@@ -77,8 +82,10 @@ class SharedHistory(History):
 
     def close(self) -> None:
         """Remove the file; who has it open keeps it."""
-        self.path.unlink(missing_ok=True)
-        os.close(self._file)
+        if self._file is not None:
+            self.path.unlink(missing_ok=True)
+            os.close(self._file)
+            self._file = None
 
 
 class AddedCycles(NamedTuple):
@@ -111,10 +118,11 @@ class HistoryFollower:
         self._file = os.open(path, os.O_RDWR)
         whole = Path(path).stat().st_size // 8
         words = np.frombuffer(mmap.mmap(self._file, 8 * whole), np.int64) if whole else np.zeros(1)
-        if words.size < WORDS or int(words[0]) != MAGIC:
+        head = words[: NUMBERS - 1].tolist() if words.size >= WORDS else [0] * (NUMBERS - 1)
+        magic, nq, n, rows = head
+        if magic != MAGIC or words.size != WORDS + rows * width_of(nq, n):
             os.close(self._file)
             raise InputError(f"{path} is not the history of a loop")
-        nq, n, rows = words[1 : NUMBERS - 1].tolist()
         self._words = words
         self._rows = words[WORDS:].view(np.float64).reshape(rows, width_of(nq, n))
         self.seen = 0
@@ -135,9 +143,10 @@ class HistoryFollower:
             ended: Whether the loop has ended, and nobody writes any more.
         """
         size = len(self._rows)
-        # The last one may not be whole yet.
-        last = int(self._words[NUMBERS + RING]) - (0 if ended else 1)
-        first = max(self.seen, last - size + 1)
+        # The last one may not be whole yet, and the next one be on its way to where the oldest is.
+        unfinished = 0 if ended else 1
+        last = int(self._words[NUMBERS + RING]) - unfinished
+        first = max(self.seen, last - size + 2 * unfinished)
         rows = self._rows[np.arange(first, last) % size]
         # Those that were overwritten while they were read are lost, too.
         now = int(self._words[NUMBERS + RING])

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import contextlib
 import json
+import logging
+import select
 import subprocess
 import sys
 from collections.abc import Mapping
@@ -14,7 +16,7 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
 from opspace.controller import ReferenceController
-from opspace.errors import OpspaceError, RecordingError
+from opspace.errors import InputError, OpspaceError, RecordingError
 from opspace.loop.shared_history import GONE, HistoryFollower, SharedHistory
 from opspace.record.format import Column, Ended
 from opspace.record.observer import STATUS, state_columns
@@ -24,6 +26,8 @@ from opspace.record.writer import Recorder
 if TYPE_CHECKING:
     from typing_extensions import Self
 
+log = logging.getLogger("opspace")
+
 LOOK = 2e-3
 """How often it is looked for new cycles, s."""
 STARTING = 60.0
@@ -31,7 +35,7 @@ STARTING = 60.0
 ENDING = 10.0
 """How long it may take to write down the rest, s."""
 READY = "ready"
-ENOUGH = "enough"
+ENOUGH = b"enough"
 
 
 class LoopRecorder:
@@ -57,7 +61,9 @@ class LoopRecorder:
         overwrite: Replace a recording that is already there.
 
     Raises:
-        RecordingError: There is a recording already, or the directory cannot be written.
+        RecordingError: There is a recording already, the directory cannot be written, or the process
+            does not begin.
+        InputError: The header is not of JSON's types.
     """
 
     def __init__(
@@ -79,21 +85,32 @@ class LoopRecorder:
             "header": {**subject_of(controller), **(header or {})},
             "overwrite": overwrite,
         }
+        try:
+            line = json.dumps(told).encode() + b"\n"
+        except (TypeError, ValueError) as error:
+            raise InputError(f"the header cannot be written down: {error}") from None
         self._process = subprocess.Popen(
             [sys.executable, "-m", __name__],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
-            text=True,
+            bufsize=0,  # what it says at its end is not read with what it says at its beginning
             start_new_session=True,  # Ctrl-C is for the loop; this one ends behind it
         )
         assert self._process.stdin is not None
-        assert self._process.stdout is not None
-        self._process.stdin.write(json.dumps(told) + "\n")
-        self._process.stdin.flush()
-        said = self._process.stdout.readline().strip()
+        with contextlib.suppress(BrokenPipeError):  # it may be gone
+            self._process.stdin.write(line)
+        said = self._first_line()
         if said != READY:
-            self._let_go()
+            self._process.kill()
+            self._process.communicate()
             raise RecordingError(said or "the process that records has ended before it began")
+
+    def _first_line(self) -> str:
+        stdout = self._process.stdout
+        assert stdout is not None
+        if not select.select([stdout], [], [], STARTING)[0]:
+            return f"the process that records did not begin within {STARTING:g} s"
+        return stdout.readline().decode().strip()
 
     @property
     def pid(self) -> int:
@@ -103,25 +120,25 @@ class LoopRecorder:
     def close(self) -> None:
         """Wait until the rest is written; a loop that goes on is recorded no further.
 
-        Raises:
-            RecordingError: It was killed, or could not write.
-        """
-        self._let_go()
-        if self._process.returncode != 0:
-            raise RecordingError(
-                f"{self.directory}: the process that records has ended with {self._process.returncode}"
-            )
+        Cycles that were overwritten before they were read are warned of.
 
-    def _let_go(self) -> None:
-        stdin, stdout = self._process.stdin, self._process.stdout
-        assert stdin is not None
-        assert stdout is not None
-        with contextlib.suppress(BrokenPipeError):  # it may be gone
-            if not stdin.closed:
-                stdin.write(ENOUGH)
-            stdin.close()
-        stdout.close()
-        self._process.wait(ENDING)
+        Raises:
+            RecordingError: It was killed, could not write, or still writes after `ENDING`.
+        """
+        process = self._process
+        assert process.stdin is not None
+        try:
+            said, _ = process.communicate(None if process.stdin.closed else ENOUGH, ENDING)
+        except subprocess.TimeoutExpired:
+            raise RecordingError(
+                f"{self.directory}: the process that records still writes after {ENDING:g} s"
+            ) from None
+        if process.returncode != 0:
+            raise RecordingError(
+                f"{self.directory}: the process that records has ended with {process.returncode}"
+            )
+        if said:
+            log.warning("%s: %s", self.directory, said.decode().strip())
 
     def __enter__(self) -> Self:
         return self
@@ -168,7 +185,10 @@ def follow(history: HistoryFollower, recorder: Recorder, owner: _Owner) -> None:
             break
     how, reason = end
     if lost:
-        reason = f"{reason}; {lost} cycles were overwritten before they were read".lstrip("; ")
+        told = f"{lost} cycles were overwritten before they were read"
+        reason = f"{reason}; {told}".lstrip("; ")
+        with contextlib.suppress(BrokenPipeError):  # whoever began this may be gone
+            print(told, flush=True)
     recorder.close(_ended(how), reason)
 
 

@@ -106,13 +106,14 @@ class ContactMember:
 
 
 class _Asked(NamedTuple):
-    """A request that waits for its time."""
+    """A request that waits for its time, by the clock after so many pauses."""
 
     start: float
     contact: GroundContact
     target: float
     timing: Timing
     waits: bool
+    clock: int
 
 
 class ContactCourse:
@@ -128,6 +129,7 @@ class ContactCourse:
         self._bind: Callable[[GroundContact], None] | None = None
         self._now: float | None = None
         self._hindrance = 0.0
+        self._resuming, self._clock = False, 0
         self._lock = Lock()
 
     def __iter__(self) -> Iterator[GroundContact]:
@@ -202,7 +204,7 @@ class ContactCourse:
     def _ask(self, contact: GroundContact, target: float, timing: Timing, *, waits: bool) -> None:
         start = -math.inf if timing.start_time is None else timing.start_time
         with self._lock:
-            self._queue.append(_Asked(start, contact, target, timing, waits))
+            self._queue.append(_Asked(start, contact, target, timing, waits, self._clock))
             self._queue.sort(key=lambda asked: asked.start)
 
     def cancel(self) -> None:
@@ -212,7 +214,24 @@ class ContactCourse:
 
     def resume(self) -> None:
         """Let the next tick go on as if no time had passed since the one before."""
-        self._now = None
+        with self._lock:
+            self._clock += 1
+            self._resuming = True
+
+    def _resume(self, t: float) -> None:
+        """Let what waits for its time wait on, but what was asked in the pause."""
+        self._resuming = False
+        if self._now is None:
+            return
+        pause, self._now = t - self._now, t
+        clock = self._clock
+        queue = [
+            asked
+            if asked.clock == clock
+            else asked._replace(start=asked.start + pause, clock=clock)
+            for asked in self._queue
+        ]
+        self._queue = sorted(queue, key=lambda asked: asked.start)
 
     def hinder(self, hindrance: float) -> None:
         """Tell what was given up in a tick, as a multiple of what may be."""
@@ -225,6 +244,9 @@ class ContactCourse:
 
     def begin_tick(self, t: float) -> tuple[ContactMember, ...]:
         """Start what is due at time ``t`` [s], move on what is on its way, drop what has left."""
+        if self._resuming:
+            with self._lock:
+                self._resume(t)
         dt = 0.0 if self._now is None else max(0.0, t - self._now)
         self._now = t
         if not self._members and not self._queue:

@@ -16,15 +16,25 @@ class Queued(NamedTuple):
         order: Its place among others, s.
         start: When it is to start, s; −inf is the next tick.
         request: The request.
+        clock: How many pauses there were before it was made, each of which may begin the time anew.
     """
 
     order: float
     start: float
     request: Request
+    clock: int = 0
 
-    def later(self, pause: float) -> Queued:
-        """Return the same, so much later [s] if it has a time at which it starts."""
-        return Queued(self.order + pause, self.start + pause, self.request.later(pause))
+    def later(self, pause: float, t: float, clock: int) -> Queued:
+        """Return the same by another clock, so much later [s] if it starts at a time of the one before.
+
+        Args:
+            pause: How much the clocks differ, s.
+            t: Time by the other one, s.
+            clock: Its number.
+        """
+        if self.clock == clock:
+            return self._replace(order=max(self.start, t))
+        return Queued(self.order + pause, self.start + pause, self.request.later(pause), clock)
 
 
 class Happening(NamedTuple):
@@ -74,11 +84,12 @@ class Course:
             self.arrives = min(self.arrives, ramp.start_time + ramp.duration)
         self.following = min(self.arrives, self.starts)
 
-    def wait(self, pause: float) -> None:
-        """Let everything happen so much later, s."""
+    def wait(self, pause: float, t: float, clock: int) -> None:
+        """Let everything happen so much later, but what was asked in a pause; see `Queued.later`."""
         for variable in variables_of(self.members.values()):
             variable.wait(pause)
-        self.queue = [queued.later(pause) for queued in self.queue]
+        queue = [queued.later(pause, t, clock) for queued in self.queue]
+        self.queue = sorted(queue, key=lambda queued: queued.order)
         self.look()
 
     def next_event(self, t: float, before: float | None, at: float) -> Happening:

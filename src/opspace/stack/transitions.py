@@ -38,7 +38,7 @@ class Transitions:
         # Nothing happens to the stack before this time, unless something new is asked.
         self._next = -math.inf
         self._asked = False
-        self._resuming = False
+        self._resuming, self._clock = False, 0
         # One request at a time is prepared, which takes long; the other lock is held briefly.
         self._requesting = RLock()
         self._lock = Lock()
@@ -165,7 +165,9 @@ class Transitions:
 
     def resume(self) -> None:
         """Let the next tick go on as if no time had passed since the one before."""
-        self._resuming = self._asked = True
+        with self._lock:
+            self._clock += 1
+            self._resuming = self._asked = True
 
     def _resume(self, t: float) -> None:
         """Move everything that has a time on by the pause, and let tasks find anew what they hold."""
@@ -173,7 +175,7 @@ class Transitions:
         if self._now is None:
             return
         pause = t - self._now
-        self._course.wait(pause)
+        self._course.wait(pause, t, self._clock)
         self._coming.clear()  # requests and ramps are others now
         self._ripe = None
         self._now = t
@@ -269,7 +271,7 @@ class Transitions:
         now = -math.inf if self._now is None else self._now
         wanted = request.timing.start_time
         start = -math.inf if wanted is None else wanted
-        new = Queued(max(start, now), start, request)
+        new = Queued(max(start, now), start, request, self._clock)
         for queued in self._course.queue:
             if queued.order <= new.order:
                 queued.request.check(known)

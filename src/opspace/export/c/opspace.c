@@ -1,4 +1,5 @@
-/* Everything of an exported controller that is not its mathematics; see opspace.h. */
+/* An exported controller: its memory, its step, and what belongs to the thread that steps; see
+ * opspace.h. */
 #include "opspace_inside.h"
 
 #include <math.h>
@@ -79,57 +80,6 @@ static void find_fields(opspace *c)
     c->stance.hindrance = memory_of(c, "stance.hindrance");
 }
 
-/* Numbers of the longest letter. */
-static int longest(const opspace_model *m)
-{
-    int most = 12 + 6 + 6;
-    for (int i = 0; i < m->tasks; i++)
-        if (3 * m->task[i].rows > most)
-            most = 3 * m->task[i].rows;
-    return most;
-}
-
-static int make_ring(opspace *c)
-{
-    int size = longest(c->model);
-    c->paper = calloc((size_t)LETTERS * (size_t)size, sizeof *c->paper);
-    if (!c->paper)
-        return 0;
-    for (unsigned i = 0; i < LETTERS; i++) {
-        c->ring[i].turn = i;
-        c->ring[i].x = c->paper + i * (unsigned)size;
-    }
-    return 1;
-}
-
-/* Take the next empty letter; NULL where there is none. */
-static letter *empty_letter(opspace *c, int what, int about, unsigned *number)
-{
-    unsigned mine = __atomic_load_n(&c->written, __ATOMIC_RELAXED);
-    for (;;) {
-        letter *one = &c->ring[mine % LETTERS];
-        unsigned turn = __atomic_load_n(&one->turn, __ATOMIC_ACQUIRE);
-        if (turn == mine) {
-            if (__atomic_compare_exchange_n(
-                    &c->written, &mine, mine + 1, 0, __ATOMIC_RELAXED, __ATOMIC_RELAXED)) {
-                one->what = what;
-                one->about = about;
-                *number = mine;
-                return one;
-            }
-        } else if ((int)(turn - mine) < 0) {
-            return NULL;
-        } else {
-            mine = __atomic_load_n(&c->written, __ATOMIC_RELAXED);
-        }
-    }
-}
-
-static void send(letter *one, unsigned number)
-{
-    __atomic_store_n(&one->turn, number + 1, __ATOMIC_RELEASE);
-}
-
 opspace *opspace_open(const opspace_model *model)
 {
     if (!model || strcmp(model->stamp, opspace_stamp) != 0)
@@ -140,7 +90,8 @@ opspace *opspace_open(const opspace_model *model)
     c->model = model;
     c->words = calloc((size_t)model->words, sizeof *c->words);
     c->state = calloc((size_t)(model->nq + model->n), sizeof *c->state);
-    if (!c->words || !c->state || !make_ring(c) || !opspace_make_places(c) || !opspace_make_contacts(c)) {
+    if (!c->words || !c->state || !opspace_make_ring(c) || !opspace_make_places(c)
+        || !opspace_make_contacts(c)) {
         opspace_close(c);
         return NULL;
     }
@@ -166,7 +117,7 @@ void opspace_close(opspace *c)
     free(c);
 }
 
-static int all_finite(const double *x, int count)
+int opspace_all_finite(const double *x, int count)
 {
     for (int i = 0; i < count; i++)
         if (!isfinite(x[i]))
@@ -232,7 +183,7 @@ static void without_gravity(const opspace *c, double *tau)
 }
 
 /* What a force task remembers; NULL of another task. */
-static double *press_of(const opspace *c, int task)
+double *opspace_press_of(const opspace *c, int task)
 {
     const int64_t *kind = c->kind + task * KIND_SIZE;
     return kind[KIND_KIND] == KIND_FORCE ? c->press + kind[KIND_PRESS] * PRESS_SIZE : NULL;
@@ -241,14 +192,12 @@ static double *press_of(const opspace *c, int task)
 static int all_measured(const opspace *c)
 {
     for (int i = 0; i < c->model->tasks; i++) {
-        const double *row = press_of(c, i);
+        const double *row = opspace_press_of(c, i);
         if (row && !isfinite(row[PRESS_GIVEN_AT]))
             return 0;
     }
     return 1;
 }
-
-static void read_letters(opspace *c);
 
 /* Quaternions as they are to be; 0 where one has no direction. */
 static int normalise(const opspace *c, double *q)
@@ -285,18 +234,22 @@ static int64_t answered(opspace *c, int64_t answer, double *tau)
 int64_t opspace_step(opspace *c, double t, const double *q, const double *v, double *tau)
 {
     const opspace_model *m = c->model;
-    if (!isfinite(t) || !all_finite(q, m->nq) || !all_finite(v, m->n))
+    if (!isfinite(t) || !opspace_all_finite(q, m->nq) || !opspace_all_finite(v, m->n))
         return OPSPACE_NOT_FINITE;
     memcpy(c->state, q, (size_t)m->nq * sizeof *q);
     if (!normalise(c, c->state))
         return OPSPACE_NOT_FINITE;
     if (!all_measured(c)) {
-        read_letters(c);
+        opspace_read_letters(c);
         return OPSPACE_NO_WRENCH;
     }
-    opspace_move_contacts(c, c->begun ? fmax(0.0, t - c->before) : 0.0);
-    read_letters(c);
-    opspace_tidy_places(c, t);
+    if (c->paused)
+        opspace_pause(c, t - c->before);
+    else
+        opspace_move_contacts(c, c->begun ? fmax(0.0, t - c->before) : 0.0);
+    c->paused = 0;
+    opspace_read_letters(c);
+    opspace_start_timed(c, t);
     int64_t found = watch(c, t, c->state, v);
     c->before = t;
     c->begun = 1;
@@ -316,228 +269,37 @@ int opspace_find_task(const opspace *c, const char *name)
     return OPSPACE_NO_TASK;
 }
 
-static const opspace_task *task_at(const opspace *c, int task)
+const opspace_task *opspace_task_at(const opspace *c, int task)
 {
     return task < 0 || task >= c->model->tasks ? NULL : &c->model->task[task];
 }
 
-static int is_rotation(const double *R)
-{
-    for (int i = 0; i < 3; i++)
-        for (int j = 0; j < 3; j++) {
-            double product = 0.0;
-            for (int k = 0; k < 3; k++)
-                product += R[3 * i + k] * R[3 * j + k];
-            if (!(fabs(product - (i == j)) < 1e-6))
-                return 0;
-        }
-    double volume = R[0] * (R[4] * R[8] - R[5] * R[7]) - R[1] * (R[3] * R[8] - R[5] * R[6])
-        + R[2] * (R[3] * R[7] - R[4] * R[6]);
-    return volume > 0.0;
-}
-
-/* A target that jumps is another one, to which angles take the short way. */
-static int rotation_jumps(const double *before, const double *now)
-{
-    double trace = 0.0;
-    for (int i = 0; i < 9; i++)
-        trace += before[i] * now[i];
-    return 0.5 * (trace - 1.0) < cos(TARGET_STEP);
-}
-
-static int joints_jump(const opspace *c, const opspace_task *task, const double *x)
-{
-    for (int i = 0; i < task->rows; i++) {
-        double moved = x[i] - c->goal[3 * (task->first_row + i)];
-        moved -= 2.0 * HALF_TURN * nearbyint(moved / (2.0 * HALF_TURN));
-        if (fabs(moved) > TARGET_STEP)
-            return 1;
-    }
-    return 0;
-}
-
-static void copy(double *to, const double *from, int count)
+void opspace_copy(double *to, const double *from, int count)
 {
     for (int i = 0; i < count; i++)
         to[i] = from ? from[i] : 0.0;
 }
 
-static int finite_or_none(const double *x, int count)
-{
-    return !x || all_finite(x, count);
-}
-
-/* Numbers of the velocity of a target. */
-static int speeds_of(const opspace_task *one)
-{
-    return one->joints ? one->joints : (one->position ? 3 : 0) + (one->orientation ? 3 : 0);
-}
-
-int opspace_set_target(
-    opspace *c, int task, const double *x, const double *velocity, const double *acceleration)
-{
-    const opspace_task *one = task_at(c, task);
-    if (!one)
-        return OPSPACE_NO_TASK;
-    int size = speeds_of(one), given = one->joints + one->position + one->orientation;
-    if (given == 0 || !all_finite(x, given) || !finite_or_none(velocity, size) || !finite_or_none(acceleration, size))
-        return OPSPACE_REFUSED;
-    if (one->orientation && !is_rotation(x + one->position))
-        return OPSPACE_REFUSED;
-    unsigned number;
-    letter *letter = empty_letter(c, TARGET_LETTER, task, &number);
-    if (!letter)
-        return OPSPACE_BUSY;
-    copy(letter->x, x, given);
-    copy(letter->x + given, velocity, size);
-    copy(letter->x + given + size, acceleration, size);
-    send(letter, number);
-    return 0;
-}
-
-static void go_to_joints(opspace *c, const opspace_task *one, int64_t *kind, const double *x)
-{
-    if (joints_jump(c, one, x))
-        kind[KIND_REMEMBERS] = 0;
-    for (int i = 0; i < one->joints; i++)
-        for (int k = 0; k < 3; k++)
-            c->goal[3 * (one->first_row + i) + k] = x[k * one->joints + i];
-}
-
-static void go_to(opspace *c, int task, const double *x)
-{
-    const opspace_task *one = &c->model->task[task];
-    int64_t *kind = c->kind + task * KIND_SIZE;
-    if (one->joints) {
-        go_to_joints(c, one, kind, x);
-        return;
-    }
-    double *number = c->numbers + task * NUMBERS_SIZE;
-    const double *R = x + one->position, *speeds = R + one->orientation;
-    if (one->orientation) {
-        if (rotation_jumps(number + NUMBERS_GOAL_ROTATION, R))
-            kind[KIND_REMEMBERS] = 0;
-        copy(number + NUMBERS_GOAL_ROTATION, R, 9);
-    }
-    if (one->position)
-        copy(number + NUMBERS_GOAL_POSITION, x, 3);
-    copy(number + NUMBERS_GOAL_VELOCITY, speeds, speeds_of(one));
-    copy(number + NUMBERS_GOAL_ACCELERATION, speeds + speeds_of(one), speeds_of(one));
-}
-
-int opspace_set_gains(opspace *c, int task, const double *kp, const double *kv)
-{
-    const opspace_task *one = task_at(c, task);
-    if (!one)
-        return OPSPACE_NO_TASK;
-    const double *row = press_of(c, task);
-    for (int i = 0; i < one->rows; i++)
-        if (row && (kp[i] != 0.0 || !(row[PRESS_KI] <= 0.5 * kv[i] * (1.0 + row[PRESS_KP]))))
-            return OPSPACE_REFUSED;
-    for (int i = 0; i < one->rows; i++)
-        if (!isfinite(kp[i]) || !isfinite(kv[i]) || kp[i] < 0.0 || kv[i] < 0.0)
-            return OPSPACE_REFUSED;
-    unsigned number;
-    letter *letter = empty_letter(c, GAINS_LETTER, task, &number);
-    if (!letter)
-        return OPSPACE_BUSY;
-    copy(letter->x, kp, one->rows);
-    copy(letter->x + one->rows, kv, one->rows);
-    send(letter, number);
-    return 0;
-}
-
 int opspace_set_wrench(opspace *c, int task, double t, const double *wrench)
 {
-    if (!task_at(c, task))
+    if (!opspace_task_at(c, task))
         return OPSPACE_NO_TASK;
-    double *row = press_of(c, task);
-    if (!row || !isfinite(t) || !all_finite(wrench, 6))
+    double *row = opspace_press_of(c, task);
+    if (!row || !isfinite(t) || !opspace_all_finite(wrench, 6))
         return OPSPACE_REFUSED;
-    copy(row + PRESS_GIVEN, wrench, 6);
+    opspace_copy(row + PRESS_GIVEN, wrench, 6);
     row[PRESS_GIVEN_AT] = t;
-    return 0;
-}
-
-int opspace_set_force(opspace *c, int task, const double *force)
-{
-    const opspace_task *one = task_at(c, task);
-    if (!one)
-        return OPSPACE_NO_TASK;
-    double *row = press_of(c, task), size = 0.0;
-    if (!row || !all_finite(force, one->rows))
-        return OPSPACE_REFUSED;
-    for (int i = 0; i < (int)row[PRESS_FORCES]; i++)
-        size += force[i] * force[i];
-    if (sqrt(size) < row[PRESS_ON])
-        return OPSPACE_REFUSED;
-    unsigned number;
-    letter *letter = empty_letter(c, FORCE_LETTER, task, &number);
-    if (!letter)
-        return OPSPACE_BUSY;
-    copy(letter->x, force, one->rows);
-    send(letter, number);
     return 0;
 }
 
 int opspace_set_activation(opspace *c, int task, double activation)
 {
-    if (!task_at(c, task))
+    if (!opspace_task_at(c, task))
         return OPSPACE_NO_TASK;
     if (!(activation >= 0.0 && activation <= 1.0))
         return OPSPACE_REFUSED;
     c->own[task] = activation;
     return 0;
-}
-
-/* Take a change of place for whoever asks for one; 0 where all are on their way. */
-static int take_change(opspace *c)
-{
-    int there = __atomic_load_n(&c->room, __ATOMIC_RELAXED);
-    while (there > 0)
-        if (__atomic_compare_exchange_n(
-                &c->room, &there, there - 1, 0, __ATOMIC_ACQUIRE, __ATOMIC_RELAXED))
-            return 1;
-    return 0;
-}
-
-static int ask_for_change(
-    opspace *c, int what, int task, double other, double t, double duration)
-{
-    unsigned number;
-    if (c->model->moves == 0 || !isfinite(t) || !isfinite(duration) || duration < 0.0)
-        return OPSPACE_REFUSED;
-    if (!take_change(c))
-        return OPSPACE_BUSY;
-    letter *letter = empty_letter(c, what, task, &number);
-    if (!letter) {
-        __atomic_fetch_add(&c->room, 1, __ATOMIC_RELEASE);
-        return OPSPACE_BUSY;
-    }
-    letter->x[0] = other;
-    letter->x[1] = t;
-    letter->x[2] = duration;
-    send(letter, number);
-    return 0;
-}
-
-int opspace_move(opspace *c, int task, double level, double t, double duration)
-{
-    if (!task_at(c, task))
-        return OPSPACE_NO_TASK;
-    for (int i = 0; i < c->model->levels; i++)
-        if (c->model->level[i] == level)
-            return ask_for_change(c, MOVE_LETTER, task, i, t, duration);
-    return OPSPACE_REFUSED;
-}
-
-int opspace_swap(opspace *c, int first, int second, double t, double duration)
-{
-    if (!task_at(c, first) || !task_at(c, second))
-        return OPSPACE_NO_TASK;
-    if (first == second)
-        return OPSPACE_REFUSED;
-    return ask_for_change(c, SWAP_LETTER, first, second, t, duration);
 }
 
 int opspace_find_contact(const opspace *c, const char *name)
@@ -556,84 +318,14 @@ int opspace_contact_row(const opspace *c, int contact)
     return OPSPACE_NO_TASK;
 }
 
-int opspace_set_contact(opspace *c, int contact, int present, double duration, int wait)
-{
-    if (contact < 0 || contact >= c->model->contacts)
-        return OPSPACE_NO_TASK;
-    if (!isfinite(duration) || duration < 0.0)
-        return OPSPACE_REFUSED;
-    unsigned number;
-    letter *letter = empty_letter(c, CONTACT_LETTER, contact, &number);
-    if (!letter)
-        return OPSPACE_BUSY;
-    letter->x[0] = present ? 1.0 : 0.0;
-    letter->x[1] = duration;
-    letter->x[2] = wait ? 1.0 : 0.0;
-    send(letter, number);
-    return 0;
-}
-
-int opspace_set_presence(opspace *c, int task, int present, double t, double duration)
-{
-    if (!task_at(c, task))
-        return OPSPACE_NO_TASK;
-    if (!isfinite(t) || !isfinite(duration) || duration < 0.0)
-        return OPSPACE_REFUSED;
-    unsigned number;
-    letter *letter = empty_letter(c, PRESENCE_LETTER, task, &number);
-    if (!letter)
-        return OPSPACE_BUSY;
-    letter->x[0] = present ? 1.0 : 0.0;
-    letter->x[1] = t;
-    letter->x[2] = duration;
-    send(letter, number);
-    return 0;
-}
-
-static void open_letter(opspace *c, const letter *one)
-{
-    const double *x = one->x;
-    const opspace_task *task = &c->model->task[one->about];
-    switch (one->what) {
-    case TARGET_LETTER:
-        go_to(c, one->about, x);
-        break;
-    case GAINS_LETTER:
-        copy(c->kp + task->first_row, x, task->rows);
-        copy(c->kv + task->first_row, x + task->rows, task->rows);
-        break;
-    case FORCE_LETTER:
-        copy(press_of(c, one->about) + PRESS_WANTED, x, task->rows);
-        break;
-    case MOVE_LETTER:
-        opspace_let_move(c, one->about, (int)x[0], x[1], x[2]);
-        break;
-    case SWAP_LETTER:
-        opspace_let_swap(c, one->about, (int)x[0], x[1], x[2]);
-        break;
-    case CONTACT_LETTER:
-        opspace_let_touch(c, one->about, x[0] != 0.0, x[1], x[2] != 0.0);
-        break;
-    default:
-        opspace_send(c->variable + one->about * VARIABLE_SIZE, x[0], x[1], x[2]);
-    }
-}
-
-/* Do what is asked for; a letter that is being written waits for the next step. */
-static void read_letters(opspace *c)
-{
-    for (int i = 0; i < LETTERS; i++) {
-        letter *one = &c->ring[c->taken % LETTERS];
-        if (__atomic_load_n(&one->turn, __ATOMIC_ACQUIRE) != c->taken + 1)
-            return;
-        open_letter(c, one);
-        __atomic_store_n(&one->turn, c->taken + LETTERS, __ATOMIC_RELEASE);
-        c->taken++;
-    }
-}
-
 void opspace_restart(opspace *c)
 {
+    if (c->begun) {
+        /* What was asked for until now comes after this step of the contacts, by the old clock. */
+        opspace_move_contacts(c, 0.0);
+        opspace_read_letters(c);
+        c->paused = 1;
+    }
     c->begun = 0;
     for (int i = 0; i < c->model->tasks; i++)
         c->kind[i * KIND_SIZE + KIND_REMEMBERS] = 0;

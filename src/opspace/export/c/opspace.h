@@ -3,8 +3,8 @@
  * Link the sources of the library, the file of the controller, the kernels and the mathematics library
  * (-lm). Nothing here locks, and only opspace_open allocates. Targets, gains, forces, levels and what
  * comes and goes may be asked for from any thread at any time, and neither that thread nor the step
- * waits; everything else is for the thread that steps. Different controllers, also of one model, are independent. Units are SI
- * and radians, rotations 3 x 3 by rows.
+ * waits; everything else is for the thread that steps. Different controllers, also of one model, are
+ * independent. Units are SI and radians, rotations 3 x 3 by rows.
  */
 #ifndef OPSPACE_H
 #define OPSPACE_H
@@ -99,8 +99,8 @@ void opspace_close(opspace *controller);
  * Where the robot adds the torque against gravity, tau is what it adds that to.
  * Returns what happened, a sum of OPSPACE_ statuses, 0 in an ordinary tick. With OPSPACE_FAULT tau is
  * the torque against the bias with joint damping. OPSPACE_NOT_FINITE, negative: time or state is not
- * finite or a quaternion has no direction, and tau is as it was; nor does it change with OPSPACE_NO_WRENCH, a force task that has never
- * been given one. */
+ * finite or a quaternion has no direction, and tau is as it was; nor does it change with
+ * OPSPACE_NO_WRENCH, a force task that has never been given one. */
 int64_t opspace_step(opspace *controller, double t, const double *q, const double *v, double *tau);
 
 /* Number of a task, or OPSPACE_NO_TASK. */
@@ -111,7 +111,8 @@ int opspace_find_task(const opspace *controller, const char *name);
  * x is a position (3), then a rotation (9), or joint positions, as the task has them; velocity and
  * acceleration are 3 numbers for each of position and rotation, or one for each joint, NULL for zero.
  * Returns 0, OPSPACE_NO_TASK or OPSPACE_REFUSED: a number is not finite, or x holds no rotation; or
- * OPSPACE_BUSY, as everything that may be asked from any thread: 64 wishes wait for the next step. */
+ * OPSPACE_BUSY, as everything that may be asked from any thread: 64 wishes wait for the next step, or
+ * for times of their own. */
 int opspace_set_target(
     opspace *controller, int task, const double *x, const double *velocity,
     const double *acceleration);
@@ -139,16 +140,19 @@ int opspace_set_force(opspace *controller, int task, const double *force);
 
 /* Let a task come (present is 1) or go (0) from time t on, for so many seconds.
  *
- * A task on its way turns without a step. The torque follows as smoothly as the profile that the task
- * was exported with. Returns 0, OPSPACE_NO_TASK or OPSPACE_REFUSED. */
+ * It waits for a time that is to come, and begins with the next step where t is not after the step
+ * before, so that nobody who asks late asks for a step in the torque. A task on its way turns. The torque
+ * follows as smoothly as the profile that the task was exported with. Returns 0, OPSPACE_NO_TASK or
+ * OPSPACE_REFUSED. */
 int opspace_set_presence(opspace *controller, int task, int present, double t, double duration);
 
 /* Move a task to another level from time t on, within so many seconds; it is never absent on the way.
  *
  * level is the number of one that the model was exported with; a task that is not there is at it at once.
- * Asked again on the way it turns without a step. Returns 0, OPSPACE_NO_TASK or OPSPACE_REFUSED; or
- * OPSPACE_BUSY: as many tasks are on their way to other levels as the model was exported for, and one
- * has to arrive first. */
+ * Asked again on the way it turns without a step. Times are those of opspace_set_presence. Returns 0,
+ * OPSPACE_NO_TASK or OPSPACE_REFUSED; or OPSPACE_BUSY: as many tasks are on their way to other levels,
+ * or wait for their time, as the model was exported for, and one has to arrive first. To turn takes the
+ * room of one, too, until it has begun. */
 int opspace_move(opspace *controller, int task, double level, double t, double duration);
 
 /* Exchange the levels of two tasks, as opspace_move; asked again on the way, it is turned around. */
@@ -173,8 +177,9 @@ int opspace_contact_row(const opspace *controller, int contact);
  * It is the caller's to change it smoothly. Returns 0, OPSPACE_NO_TASK or OPSPACE_REFUSED. */
 int opspace_set_activation(opspace *controller, int task, double activation);
 
-/* Let time go on from anywhere at the next step, and angles take the short way. Tasks on their way in
- * or out are at the new time where they would be without the pause. */
+/* Let time go on from anywhere at the next step, and angles take the short way. Tasks on their way go on
+ * from where they were, and what waits for its time waits on; times that are given from now on are those
+ * of the clock after the pause. From the thread that steps. */
 void opspace_restart(opspace *controller);
 
 /* What the last step left, by a name of opspace_codes.h; NULL if there is none of that name.

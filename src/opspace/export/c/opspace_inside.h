@@ -33,6 +33,14 @@ typedef struct {
     double *x;
 } letter;
 
+/* A letter that waits for its time. */
+typedef struct {
+    int what;
+    int about;
+    double order;
+    double x[3];
+} wish;
+
 /* A level at which a task is, or to which it is on its way. */
 typedef struct {
     int level;  /* place in the table of levels */
@@ -65,10 +73,12 @@ struct opspace {
     int64_t *kind, *endless, *group, *first_kept, *slots, *slot_on, *slot_off, *slot_place;
     double *state, *last;
     double before;
-    int begun, carried;
+    int begun, carried, paused;
     letter ring[LETTERS];
     double *paper;
     unsigned written, taken;
+    wish later[LETTERS]; /* in the order of their times */
+    int timed;
     /* Where tasks are: places of each, one after the other, and the changes between them. */
     place *place;
     int *places;
@@ -85,6 +95,16 @@ struct opspace {
     } stance;
 };
 
+/* opspace.c: tasks, and numbers. */
+const opspace_task *opspace_task_at(const opspace *c, int task);
+double *opspace_press_of(const opspace *c, int task);
+int opspace_all_finite(const double *x, int count);
+void opspace_copy(double *to, const double *from, int count);
+
+/* opspace_wishes.c: letters. */
+int opspace_make_ring(opspace *c);
+void opspace_read_letters(opspace *c);
+
 /* opspace_ramps.c: activations in time. */
 double opspace_profile(int code, double s);
 int opspace_arrived(const double *ramp, double t);
@@ -98,6 +118,12 @@ void opspace_pack_places(opspace *c);
 void opspace_let_move(opspace *c, int task, int level, double t, double duration);
 void opspace_let_swap(opspace *c, int first, int second, double t, double duration);
 void opspace_tidy_places(opspace *c, double t);
+
+/* opspace_timed.c: what starts at a time of its own. */
+int opspace_has_time(int what);
+int opspace_let_wait(opspace *c, const letter *asked);
+void opspace_start_timed(opspace *c, double t);
+void opspace_pause(opspace *c, double pause);
 
 /* opspace_contacts.c: what a robot with a floating base touches. */
 int opspace_make_contacts(opspace *c);

@@ -257,7 +257,6 @@ static void move(opspace *c, int task, int level, double t, double duration)
 
 void opspace_let_move(opspace *c, int task, int level, double t, double duration)
 {
-    opspace_tidy_places(c, t);
     move(c, task, level, t, duration);
     opspace_pack_places(c);
 }
@@ -290,7 +289,6 @@ static void swap(opspace *c, int first, int second, double t, double duration)
 
 void opspace_let_swap(opspace *c, int first, int second, double t, double duration)
 {
-    opspace_tidy_places(c, t);
     swap(c, first, second, t, duration);
     opspace_pack_places(c);
 }
