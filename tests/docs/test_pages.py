@@ -114,8 +114,8 @@ def test_the_programs_are_found():
     found = {name_of(page) for page in WITH_PROGRAMS}
     assert {"README.md", "docs/theory.md", "docs/tutorial.md", "docs/how-to/mujoco.md"} <= found
     unknown = {block.language for page in PAGES for block in blocks_of(page)}
-    # Patches are applied and used by test_worked_examples, C is compiled by export/test_c_library.
-    assert unknown <= {"python", "sh", "yaml", "xml", "text", "diff", "c", "cmake"}
+    # Patches are applied by test_worked_examples, C and C++ compiled by export/test_c_library.
+    assert unknown <= {"python", "sh", "yaml", "xml", "text", "diff", "c", "cpp", "cmake"}
 
 
 def parse_opspace(words):
