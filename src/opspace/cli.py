@@ -826,8 +826,15 @@ def export_as_c(
     from opspace.scenario.build import build
 
     controller = build(load_scenario(scenario, overrides or ())).controller
-    wanted = {"absent": absent or (), "levels": levels or (), "moves": moves}
-    export_c(controller, out, name, overwrite=overwrite, **wanted)
+    export_c(
+        controller,
+        out,
+        name,
+        absent=absent or (),
+        levels=levels or (),
+        moves=moves,
+        overwrite=overwrite,
+    )
     print(f"results: {out}")
 
 

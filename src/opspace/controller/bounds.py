@@ -49,14 +49,10 @@ class Bounds:
     upper: np.ndarray = field(init=False)
 
     def __post_init__(self) -> None:
-        lower, upper = np.full(self.bias.size, -np.inf), np.full(self.bias.size, np.inf)
+        lower, upper = self._by_joint([term.command for term in self.terms])
         haste = np.zeros((2, self.bias.size))
         for term in self.terms:
             haste[int(term.side.sign > 0.0), term.side.index] = term.haste
-            if term.side.sign > 0.0:
-                upper[term.side.index] = term.command
-            else:
-                lower[term.side.index] = -term.command
         # Who must stop at once may do so, whatever the speed limit behind it would say.
         upper += np.minimum(haste[0], np.maximum(lower - upper, 0.0))
         lower -= np.minimum(haste[1], np.maximum(lower - upper, 0.0))
@@ -90,12 +86,15 @@ class Bounds:
 
     def by_position(self) -> tuple[np.ndarray, np.ndarray]:
         """Return the bounds as far as positions ask for them, least and largest, (n,) rad/s²."""
+        return self._by_joint([term.by_position for term in self.terms])
+
+    def _by_joint(self, towards: Sequence[float]) -> tuple[np.ndarray, np.ndarray]:
         lower, upper = np.full(self.bias.size, -np.inf), np.full(self.bias.size, np.inf)
-        for term in self.terms:
+        for term, most in zip(self.terms, towards, strict=True):
             if term.side.sign > 0.0:
-                upper[term.side.index] = term.by_position
+                upper[term.side.index] = most
             else:
-                lower[term.side.index] = -term.by_position
+                lower[term.side.index] = -most
         return lower, upper
 
     def passed(self, acceleration: np.ndarray) -> bool:

@@ -13,7 +13,7 @@ from dataclasses import astuple
 from pathlib import Path
 from threading import Event, Thread
 from types import TracebackType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 from opspace.controller import ReferenceController
 from opspace.errors import InputError, OpspaceError, RecordingError
@@ -189,11 +189,7 @@ def follow(history: HistoryFollower, recorder: Recorder, owner: _Owner) -> None:
         reason = f"{reason}; {told}".lstrip("; ")
         with contextlib.suppress(BrokenPipeError):  # whoever began this may be gone
             print(told, flush=True)
-    recorder.close(_ended(how), reason)
-
-
-def _ended(how: str) -> Ended:
-    return "completed" if how == "completed" else "stopped" if how == "stopped" else "crashed"
+    recorder.close(cast("Ended", how), reason)
 
 
 def main() -> None:

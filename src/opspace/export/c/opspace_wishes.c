@@ -55,6 +55,26 @@ static void send(letter *one, unsigned number)
     __atomic_store_n(&one->turn, number + 1, __ATOMIC_RELEASE);
 }
 
+/* Send a letter of three numbers. */
+static int send_three(opspace *c, int what, int about, double x, double y, double z)
+{
+    unsigned number;
+    letter *letter = empty_letter(c, what, about, &number);
+    if (!letter)
+        return OPSPACE_BUSY;
+    letter->x[0] = x;
+    letter->x[1] = y;
+    letter->x[2] = z;
+    send(letter, number);
+    return 0;
+}
+
+/* Whether something can begin at a time and take so long. */
+static int can_begin(double t, double duration)
+{
+    return isfinite(t) && isfinite(duration) && duration >= 0.0;
+}
+
 static int is_rotation(const double *R)
 {
     for (int i = 0; i < 3; i++)
@@ -211,21 +231,14 @@ static int take_change(opspace *c)
 static int ask_for_change(
     opspace *c, int what, int task, double other, double t, double duration)
 {
-    unsigned number;
-    if (c->model->moves == 0 || !isfinite(t) || !isfinite(duration) || duration < 0.0)
+    if (c->model->moves == 0 || !can_begin(t, duration))
         return OPSPACE_REFUSED;
     if (!take_change(c))
         return OPSPACE_BUSY;
-    letter *letter = empty_letter(c, what, task, &number);
-    if (!letter) {
+    int answer = send_three(c, what, task, other, t, duration);
+    if (answer)
         __atomic_fetch_add(&c->room, 1, __ATOMIC_RELEASE);
-        return OPSPACE_BUSY;
-    }
-    letter->x[0] = other;
-    letter->x[1] = t;
-    letter->x[2] = duration;
-    send(letter, number);
-    return 0;
+    return answer;
 }
 
 int opspace_move(opspace *c, int task, double level, double t, double duration)
@@ -251,34 +264,18 @@ int opspace_set_contact(opspace *c, int contact, int present, double duration, i
 {
     if (contact < 0 || contact >= c->model->contacts)
         return OPSPACE_NO_TASK;
-    if (!isfinite(duration) || duration < 0.0)
+    if (!can_begin(0.0, duration))
         return OPSPACE_REFUSED;
-    unsigned number;
-    letter *letter = empty_letter(c, CONTACT_LETTER, contact, &number);
-    if (!letter)
-        return OPSPACE_BUSY;
-    letter->x[0] = present ? 1.0 : 0.0;
-    letter->x[1] = duration;
-    letter->x[2] = wait ? 1.0 : 0.0;
-    send(letter, number);
-    return 0;
+    return send_three(c, CONTACT_LETTER, contact, present != 0, duration, wait != 0);
 }
 
 int opspace_set_presence(opspace *c, int task, int present, double t, double duration)
 {
     if (!opspace_task_at(c, task))
         return OPSPACE_NO_TASK;
-    if (!isfinite(t) || !isfinite(duration) || duration < 0.0)
+    if (!can_begin(t, duration))
         return OPSPACE_REFUSED;
-    unsigned number;
-    letter *letter = empty_letter(c, PRESENCE_LETTER, task, &number);
-    if (!letter)
-        return OPSPACE_BUSY;
-    letter->x[0] = present ? 1.0 : 0.0;
-    letter->x[1] = t;
-    letter->x[2] = duration;
-    send(letter, number);
-    return 0;
+    return send_three(c, PRESENCE_LETTER, task, present != 0, t, duration);
 }
 
 static void open_letter(opspace *c, const letter *one)
