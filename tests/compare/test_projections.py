@@ -24,7 +24,7 @@ class Same(AnotherProjection):
         self.wish = wish
         guard = self._plan.tick.distances
         softness = softness_of_rows(
-            wish.G, wish.most, wish.U @ wish.U.T, np.array(guard.motors), guard.limits[3]
+            wish.G, wish.most, wish.U @ wish.U.T, np.array(guard.motors), np.array(guard.asked)
         )
         return nearest_acceleration(
             wish.U,
@@ -62,7 +62,7 @@ def test_the_same_bounds_in_the_same_metric_give_the_same_torque():
         here = ball.position + h * ball.velocity[:3]
         ball.place(here, velocity=ball.velocity)
         osc.Controller.step(controller, 1e-3 * k, q + h * wish.v, wish.v)
-        D = np.array(controller._plan.tick.distance) - controller.collisions.margin
+        D = np.array(controller._plan.tick.distance) - controller.collisions.kept
         assert (D - wish.D) / h == pytest.approx(wish.rate, abs=1e-3)
     assert acted > 5
 

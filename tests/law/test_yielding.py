@@ -11,13 +11,14 @@ from opspace.kernels.inertia import factor
 from opspace.kernels.projection import nearest_acceleration as compiled
 from opspace.law import nearest_acceleration
 from opspace.law.nearest import softness_of_rows
-from opspace.law.scalars import SOFT_APART, yielding
+from opspace.law.scalars import CREEPING, HOPEFUL, PASSING, SOFT_APART, asked_for, yielding
 from opspace.plan.distance_records import DISTANCES
 from opspace.plan.memory import make_inertia
 from opspace.plan.records import BOUNDS
 from tests.budget import examples
 
 BRAKE = 4.0
+LEAST = asked_for(10.0, BRAKE)
 MOST, REACH = st.floats(-50.0, 50.0), st.floats(1e-3, 50.0)
 SEEDS = st.integers(0, 2**32 - 1)
 
@@ -37,27 +38,36 @@ def problem(seed, rows=1):
 
 def answer(A, L, W, x, motors, G, most):
     n, free = x.size, np.full(x.size, np.inf)
-    softness = softness_of_rows(G, most, A, motors, BRAKE)
+    softness = softness_of_rows(G, most, A, motors, np.full(most.size, LEAST))
     found = nearest_acceleration(L, W, x, -free, free, -motors, motors, G, most, softness)
     assert found.acceleration.shape == (n,)
     return found.acceleration
 
 
+@given(v=st.floats(0.0, 10.0))
+def test_what_passes_slowly_counts_as_asking_for_less(v):
+    top = HOPEFUL * BRAKE
+    asked = asked_for(v, BRAKE)
+    assert top * CREEPING / (PASSING + CREEPING) <= asked <= top
+    assert asked <= top * (v + CREEPING) / PASSING
+    assert asked <= asked_for(1.1 * v, BRAKE)
+
+
 @given(most=MOST, reach=REACH)
 def test_what_motors_can_keep_is_as_hard_as_ever(most, reach):
-    need = 0.5 * (math.hypot(most, 0.5 * BRAKE) - most)
-    assert yielding(most, math.inf, BRAKE) == 0.0
-    assert yielding(most, 1.001 * need, BRAKE) == 0.0
-    assert yielding(most, reach, BRAKE) >= yielding(most, 1.1 * reach, BRAKE)
-    assert yielding(most - 0.1, reach, BRAKE) >= yielding(most, reach, BRAKE)
+    need = 0.5 * (math.hypot(most, 2.0 * LEAST) - most)
+    assert yielding(most, math.inf, LEAST) == 0.0
+    assert yielding(most, 1.001 * need, LEAST) == 0.0
+    assert yielding(most, reach, LEAST) >= yielding(most, 1.1 * reach, LEAST)
+    assert yielding(most - 0.1, reach, LEAST) >= yielding(most, reach, LEAST)
 
 
 @given(most=MOST, reach=REACH)
 def test_it_has_no_step_and_no_kink(most, reach):
     h = 1e-6 * reach
-    value = [yielding(most, reach + k * h, BRAKE) for k in (-2, -1, 0, 1, 2)]
+    value = [yielding(most, reach + k * h, LEAST) for k in (-2, -1, 0, 1, 2)]
     before, after = (value[2] - value[0]) / 2, (value[4] - value[2]) / 2
-    need = 0.5 * (math.hypot(most, 0.5 * BRAKE) - most)
+    need = 0.5 * (math.hypot(most, 2.0 * LEAST) - most)
     # Second derivatives are at most this, on both sides of where it begins.
     curve = 24.0 * (1.0 + need / (reach - 2 * h)) ** 2 / (reach - 2 * h) ** 2
     assert abs(after - before) <= 4.0 * curve * h**2 + 1e-9 * (1.0 + value[2])
@@ -94,7 +104,7 @@ def test_what_cannot_be_kept_does_not_take_the_other_bounds_with_it():
     x, motors = np.array([3.0, 2.0]), np.array([10.0, 10.0])
     upper = np.array([1.0, np.inf])
     G, most = np.array([[-1e-6, 1e-6]]), np.array([-5.0])
-    softness = softness_of_rows(G, most, L, motors, BRAKE)
+    softness = softness_of_rows(G, most, L, motors, np.array([LEAST]))
     found = nearest_acceleration(L, L, x, -free, upper, -motors, motors, G, most, softness)
     assert found.acceleration == pytest.approx([1.0, 2.0], abs=1e-3)
     hard = nearest_acceleration(L, L, x, -free, upper, -motors, motors, G, most)
@@ -103,11 +113,9 @@ def test_what_cannot_be_kept_does_not_take_the_other_bounds_with_it():
 
 def test_without_known_motors_all_rows_are_equally_hard():
     G, most = np.array([[1e-9, 0.0], [0.0, 1.0]]), np.array([-5.0, 1.0])
-    assert softness_of_rows(G, most, np.eye(2), np.full(2, np.inf), BRAKE).tolist() == [
-        SOFT_APART,
-        SOFT_APART,
-    ]
-    nothing = softness_of_rows(0.0 * G, most, np.eye(2), np.full(2, np.inf), BRAKE)
+    least, nobody = np.full(2, LEAST), np.full(2, np.inf)
+    assert softness_of_rows(G, most, np.eye(2), nobody, least).tolist() == [SOFT_APART] * 2
+    nothing = softness_of_rows(0.0 * G, most, np.eye(2), nobody, least)
     assert nothing.tolist() == [np.inf, np.inf]
 
 
@@ -121,7 +129,7 @@ def test_compiled_gives_way_as_the_readable_form_does(seed):
     bounds, distances = BOUNDS.make(sizes), DISTANCES.make(sizes)
     bounds.least[:], bounds.most[:] = -motors, motors
     distances.G[:], distances.most[:], distances.motors[:] = G, most, motors
-    distances.limits[3] = BRAKE
+    distances.asked[:] = LEAST
     inertia = make_inertia(np.arange(x.size) - 1)
     assert factor(A, inertia.handle())
     change = np.linalg.solve(np.triu(inertia.U), L)  # it factors the inertia from the other end

@@ -231,7 +231,7 @@ def _distances(
     _, n = set_distance(local, d.extent[sets, :3], d.extent[sets, 3:6], meshes)
     n = np.einsum("kij,ki->kj", R, n)
     v = ball[:, 3:6] - motion[:, :3] - np.cross(motion[:, 3:6], ball[:, :3])
-    D, rate = np.array(tick.distance) - guard.margin, np.einsum("ki,ki->k", n, v)
+    D, rate = np.array(tick.distance) - guard.kept, np.einsum("ki,ki->k", n, v)
     share = d.share[sets]
     own = np.where(share > 0.0, np.einsum("ki,ki->k", n, ball[:, 3:6]), rate)
     return D, rate, np.array(d.most) - closing(guard, D, rate, own, share)[0]

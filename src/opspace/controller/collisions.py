@@ -9,7 +9,7 @@ import numpy as np
 
 from opspace.law.convex import Bodies, DistanceRows, Points, distance_rows
 from opspace.law.nearest import softness_of_rows
-from opspace.law.scalars import closing_command, last_closing_command
+from opspace.law.scalars import asked_for, closing_command, last_closing_command
 from opspace.robots.protocol import Robot
 from opspace.tasks.collision_avoidance import CollisionAvoidance
 from opspace.tasks.distance_layout import DistanceLayout
@@ -26,8 +26,8 @@ class DistanceTerms(NamedTuple):
         G: (rows, n) by how much joint accelerations let each shrink faster.
         most: (rows,) m/s².
         last: (rows,) m/s² before one will soon shrink faster than it may.
+        asked: (rows,) what each counts as asking for, m/s²; see `opspace.law.scalars.asked_for`.
         motors: (n,) what the motors give, N·m; inf where nobody says.
-        brake: Acceleration with which distances can be counted on to stop shrinking, m/s².
     """
 
     layout: DistanceLayout
@@ -36,12 +36,12 @@ class DistanceTerms(NamedTuple):
     G: np.ndarray
     most: np.ndarray
     last: np.ndarray
+    asked: np.ndarray
     motors: np.ndarray
-    brake: float
 
     def softness(self, M: np.ndarray) -> np.ndarray:
         """Say how soft every bound is for the inertia M, (rows,); see `softness_of_rows`."""
-        return softness_of_rows(self.G, self.most, M, self.motors, self.brake)
+        return softness_of_rows(self.G, self.most, M, self.motors, self.asked)
 
     @property
     def by_name(self) -> Mapping[str, Placing]:
@@ -65,8 +65,9 @@ def distance_terms(
     rows = rows_of(layout, robot, placings)
     balls, sets = layout.rows[:, 0], layout.rows[:, 1]
     distance = rows.distance - layout.ball_radius[balls] - layout.set_radius[sets]
-    most, last = _commands(guard, distance - guard.margin, rows, layout.share[sets])
-    return DistanceTerms(layout, placings, distance, -rows.G, most, last, motors, guard.brake)
+    most, last = _commands(guard, distance - guard.kept, rows, layout.share[sets])
+    asked = np.array([asked_for(speed, guard.brake) for speed in rows.passing.tolist()])
+    return DistanceTerms(layout, placings, distance, -rows.G, most, last, asked, motors)
 
 
 def _commands(

@@ -4,7 +4,12 @@ from __future__ import annotations
 
 import math
 
-from opspace.kernels.compiled_scalars import closing_command, last_closing_command, yielding
+from opspace.kernels.compiled_scalars import (
+    asked_for,
+    closing_command,
+    last_closing_command,
+    yielding,
+)
 from opspace.kernels.inertia import acceleration_of, whiten
 from opspace.kernels.mesh_distance import from_mesh
 from opspace.kernels.motion import cross_add, move_joints
@@ -117,6 +122,7 @@ def _bound(work, d, i, ball, of):
     brake, k1, k2 = d.limits[BRAKE], d.limits[K1], d.limits[K2]
     command = closing_command(D, -rate, -own, share, brake, k1, k2)
     d.most[i] = drift + command
+    d.asked[i] = asked_for(math.sqrt(vx * vx + vy * vy + vz * vz), brake)
     d.last[i] = drift + last_closing_command(D, -rate, -own, share, brake, k1, command)
     _row(work, d, i, of, nx, ny, nz)
 
@@ -229,4 +235,4 @@ def row_softness(inertia, d, i):
     for a in range(way.shape[0]):
         if way[a] != 0.0:
             square += (way[a] * d.motors[a]) ** 2
-    return SOFT_APART + yielding(d.most[i], math.sqrt(square), d.limits[BRAKE])
+    return SOFT_APART + yielding(d.most[i], math.sqrt(square), d.asked[i])

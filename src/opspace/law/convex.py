@@ -57,6 +57,7 @@ class DistanceRows(NamedTuple):
     Attributes:
         distance: (k,) ρ, below 0 inside, m.
         rate: (k,) ρ̇, m/s.
+        passing: (k,) speed |v_rel| at which the point moves past the set, m/s.
         G: (k, n) by how much an acceleration of the joints changes it, 1 or m.
         drift: (k,) m/s².
         own_rate: (k,) the part of ρ̇ that the point has, n · v_p, m/s.
@@ -66,6 +67,7 @@ class DistanceRows(NamedTuple):
 
     distance: Float[np.ndarray, " k"]
     rate: Float[np.ndarray, " k"]
+    passing: Float[np.ndarray, " k"]
     G: Float[np.ndarray, "k n"]
     drift: Float[np.ndarray, " k"]
     own_rate: Float[np.ndarray, " k"]
@@ -176,4 +178,5 @@ def distance_rows(
     own_rate = np.einsum("ki,ki->k", n, points.velocity)
     straight = np.einsum("ki,kij->kj", n, points.J - bodies.J[:, :3])
     G = straight - np.einsum("ki,kij->kj", np.cross(way, n), bodies.J[:, 3:])
-    return DistanceRows(distance, rate, G, drift, own_rate, own_drift)
+    passing = np.linalg.norm(v, axis=1)
+    return DistanceRows(distance, rate, passing, G, drift, own_rate, own_drift)

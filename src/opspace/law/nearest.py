@@ -261,18 +261,18 @@ def softness_of_rows(
     most: Float[np.ndarray, " k"],
     M: Float[np.ndarray, "n n"],
     motors: Float[np.ndarray, " n"],
-    brake: float,
+    least: Float[np.ndarray, " k"],
 ) -> Float[np.ndarray, " k"]:
     """Say how soft bounds on combinations of accelerations are, by what motors can do about them.
 
-        reach = ‖diag(Γ̄) A⁻¹ Gᵀ‖,   softness = `SOFT_APART` + `yielding`(most, reach, brake)
+        reach = ‖diag(Γ̄) A⁻¹ Gᵀ‖,   softness = `SOFT_APART` + `yielding`(most, reach, least)
 
     Args:
         combined: (k, n) G.
         most: (k,) their bounds, m/s².
         M: (n, n) inertia A.
         motors: (n,) largest torques Γ̄, N·m; inf where nobody says.
-        brake: With which distances can be counted on to stop shrinking, m/s².
+        least: (k,) what each counts as asking for, see `opspace.law.scalars.asked_for`, m/s².
 
     Returns:
         (k,) softness of the rows of unit length, inf where they bound nothing.
@@ -280,8 +280,8 @@ def softness_of_rows(
     way = np.linalg.solve(M, combined.T).T
     known = np.where(way == 0.0, 0.0, motors)
     reach = np.linalg.norm(way * known, axis=1)
-    told = zip(most.tolist(), reach.tolist(), strict=True)
-    return np.array([SOFT_APART + yielding(bound, r, brake) for bound, r in told])
+    told = zip(most.tolist(), reach.tolist(), least.tolist(), strict=True)
+    return np.array([SOFT_APART + yielding(*asked) for asked in told])
 
 
 def excess(

@@ -253,6 +253,9 @@ EASE = 1.5
 SOON = 0.02
 """A distance is lost that would be closing faster than it may within this time, s."""
 
+TICK_ROOM = 2e-5
+"""By how much more than the margin distances are kept, for what a tick of a millisecond adds, m."""
+
 ROUNDED = 0.3
 """Part of a direction along an axis of a box from which on the edge there counts as round."""
 
@@ -311,14 +314,35 @@ def last_closing_command(
 TINY = 1e-12
 """What is smaller than another number by this is nothing beside it."""
 HOPEFUL = 0.25
-"""Part of the brake that every distance counts as asking for, so that one that nothing can change asks
-for too much, whatever its bound."""
+"""Part of the brake that every distance counts as asking for where things pass each other, so that one
+that nothing can change asks for too much, whatever its bound."""
+PASSING = 0.25
+"""What moves slower than this past something else counts as asking for less, m/s."""
+CREEPING = 1e-3
+"""What moves slower than this past something else counts as asking for no less, m/s."""
 
 
-def yielding(most: float, reach: float, brake: float) -> float:
+def asked_for(speed: float, brake: float) -> float:
+    """Evaluate what a distance counts as asking for, whatever its bound, m/s².
+
+        ε brake √((v² + v₀²) / (v² + v₁²)),   ε = `HOPEFUL`, v₀ = `CREEPING`, v₁ = `PASSING`
+
+    What passes slowly turns its row slowly, so that it may be held with the smaller means that it needs.
+
+    Args:
+        speed: v at which one passes the other, m/s.
+        brake: With which distances can be counted on to stop shrinking, m/s².
+    """
+    square = speed * speed
+    return (
+        HOPEFUL * brake * math.sqrt((square + CREEPING * CREEPING) / (square + PASSING * PASSING))
+    )
+
+
+def yielding(most: float, reach: float, least: float) -> float:
     """Evaluate how much softer the bound of a distance is that motors cannot keep.
 
-        need = (√(most² + (2ε brake)²) − most) / 2,   4 max(0, need/reach − 1)²,   ε = `HOPEFUL`
+        need = (√(most² + (2 least)²) − most) / 2,   4 max(0, need/reach − 1)²
 
     need is what a bound below zero asks for, rounded off at zero. The softness is once continuously
     differentiable and grows with the square of need/reach, so that what a bound moves goes to zero with
@@ -327,17 +351,16 @@ def yielding(most: float, reach: float, brake: float) -> float:
     Args:
         most: The bound, m/s².
         reach: How much motors can change about the distance, m/s²; inf where nobody says.
-        brake: With which distances can be counted on to stop shrinking, m/s².
+        least: What it counts as asking for where its bound is zero, above 0, m/s²; see `asked_for`.
 
     Returns:
         What is added to the softness of the row of unit length; inf where nothing changes the distance.
     """
     if reach == math.inf:
         return 0.0
-    least = 2.0 * HOPEFUL * brake
     # For a bound above zero the difference of two large numbers is avoided.
-    size = math.sqrt(most * most + least * least)
-    need = 0.5 * least * least / (size + most) if most > 0.0 else 0.5 * (size - most)
+    size = math.sqrt(most * most + 4.0 * least * least)
+    need = 2.0 * least * least / (size + most) if most > 0.0 else 0.5 * (size - most)
     if need <= reach:
         return 0.0
     if reach <= TINY * need:

@@ -36,6 +36,7 @@ DISTANCES = RecordTable(
     Field("G", ("distances", "n"), "by how much accelerations let each shrink faster"),
     Field("most", ("distances",), "how fast that may be", "m/s²"),
     Field("last", ("distances",), "how fast before it closes faster than it may", "m/s²"),
+    Field("asked", ("distances",), "what each counts as asking for", "m/s²"),
     Field("way", ("n",), "what changes a distance"),
     Field("held", ("distances",), "whether the projection has taken it in", dtype=_INT),
 )

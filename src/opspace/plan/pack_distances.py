@@ -31,7 +31,7 @@ class PackedDistances:
         self.layout = layout
         self.placings: tuple[Placing, ...] = ()
         self._distances = d = tick.distances
-        d.limits[:] = guard.margin, guard.k1, guard.k2, guard.brake
+        d.limits[:] = guard.kept, guard.k1, guard.k2, guard.brake
         d.row[:] = layout.rows
         for i, frame in enumerate(layout.ball_frame.tolist()):
             place = axes.frames[frame]

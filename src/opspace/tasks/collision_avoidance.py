@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from opspace.errors import InputError, unknown_name
-from opspace.law.scalars import RETURN_SPEED
+from opspace.law.scalars import RETURN_SPEED, TICK_ROOM
 from opspace.robots.protocol import Robot
 from opspace.robots.shape_file import SUFFIXES, read_shapes
 from opspace.robots.shapes import LinkCapsule, joints_that_move, shapes_of
@@ -102,6 +102,11 @@ class CollisionAvoidance:
             f"{type(self).__name__}(margin={self.margin:g}, {len(self.shapes)} shapes, "
             f"{len(self.pairs)} pairs of links, obstacles: {names})"
         )
+
+    @property
+    def kept(self) -> float:
+        """The distance that bounds keep, m: the margin, and what a tick may add to it."""
+        return self.margin + TICK_ROOM
 
     @property
     def obstacles(self) -> tuple[Obstacle, ...]:
