@@ -64,7 +64,8 @@ def test_subjects_take_turns_and_see_the_same_states():
 def test_the_slowest_state_is_found_whatever_else_the_machine_does():
     cost, rng = {0.0: 3.0, 1.0: 7.0, 2.0: 5.0}, np.random.default_rng(0)
     went = []
-    interleaved({"a": lambda q, v: went.append(q[0])}, *2 * [np.arange(3.0)[:, None]], 1300)
+    q = np.arange(3.0)[:, None]
+    interleaved({"a": lambda q, v: went.append(q[0])}, q, q, 1300)
     quiet = np.array([cost[state] for state in went[-1300:]])
     interrupted = quiet + 900.0 * (rng.uniform(size=quiet.size) < 0.3)
     assert slowest_state(interrupted, 3) == 7.0
