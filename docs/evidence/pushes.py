@@ -4,7 +4,10 @@
 pelvis or at the torso, within 0.05 to 0.2 s, gives each to both and writes ``pushes.csv`` and the table
 of docs/safety.md. The weighted program has the limits, cones and contacts of the other, weights of 10
 to 1 from level to level in place of priorities, and takes some seconds for a push. A push is its number:
-``--first 40 --pushes 1`` is the fortieth again, and what the file has already is not repeated.
+``--first 40 --pushes 1`` is the fortieth again, and what the file has already is not repeated. In the
+file the weighted program of the pushes from 472 on was compiled for the purpose, from the same
+equations: in 136 that were run both ways, those after which the laws differ among them, everybody
+stands or falls alike, errors differ by a thousandth at most and steps by three hundredths.
 """
 
 from __future__ import annotations

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from opspace.bench import SCENES, Benchmark, changes_table, compare_runs, run_benchmark
-from opspace.bench.timing import interleaved
+from opspace.bench.timing import interleaved, slowest_state
 from opspace.controller.batch import cores
 from opspace.errors import InputError, UnknownNameError
 from opspace.plots.benchmark import benchmark_figure
@@ -21,6 +21,7 @@ def test_a_scene_is_timed_beside_the_models_own_calls(tmp_path):
     assert set(times) == {"opspace", "model calls alone", "readable form"}
     for subject in times.values():
         assert 0.0 < subject["p50"] <= subject["p99"] <= subject["max"]
+        assert 0.0 < subject["slowest"] <= subject["max"]
         assert subject["ticks"] == 40
     assert found.ratio("puma", "opspace", "model calls alone") == (
         times["opspace"]["p50"] / times["model calls alone"]["p50"]
@@ -58,6 +59,17 @@ def test_subjects_take_turns_and_see_the_same_states():
     times = interleaved(ticks, q, q, 700)
     assert seen["a"] == seen["b"]
     assert all(found.shape == (700,) and (found > 0.0).all() for found in times.values())
+
+
+def test_the_slowest_state_is_found_whatever_else_the_machine_does():
+    cost, rng = {0.0: 3.0, 1.0: 7.0, 2.0: 5.0}, np.random.default_rng(0)
+    went = []
+    q = np.arange(3.0)[:, None]
+    interleaved({"a": lambda q, v: went.append(q[0])}, q, q, 1300)
+    quiet = np.array([cost[state] for state in went[-1300:]])
+    interrupted = quiet + 900.0 * (rng.uniform(size=quiet.size) < 0.3)
+    assert slowest_state(interrupted, 3) == 7.0
+    assert slowest_state(interrupted[:2], 3) == interrupted[:2].max()
 
 
 def test_bad_requests_are_refused(tmp_path):

@@ -19,14 +19,13 @@ def pushes():
         sys.path.remove(str(EVIDENCE))
 
 
-def test_the_table_is_that_of_the_file_and_both_laws_save_nearly_the_same(pushes):
+def test_the_table_is_that_of_the_file_and_priorities_save_as_many_as_weights(pushes):
     from buffer_document import block, read_csv
 
     rows = read_csv(pushes.CSV)
     assert block(pushes.DOCUMENT, "pushes") == pushes.table(rows)
     stood = {law: sum(row[law] == "True" for row in rows) for law in pushes.LAWS}
-    assert abs(stood["weighted"] - stood["ours"]) <= 0.01 * len(rows)
-    assert stood["ours"] < len(rows)
+    assert stood["weighted"] <= stood["ours"] < len(rows)
     for row in rows:
         impulse, angle, duration, frame = pushes.draw(int(row["number"]))
         assert row["frame"] == frame
@@ -36,7 +35,7 @@ def test_the_table_is_that_of_the_file_and_both_laws_save_nearly_the_same(pushes
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("which", [0, 3, 9])
+@pytest.mark.parametrize("which", [0, 3, 509])
 def test_a_push_is_its_number(pushes, which):
     from buffer_document import read_csv
 

@@ -71,6 +71,17 @@ def interleaved(
     return found
 
 
+def slowest_state(times: np.ndarray, states: int) -> float:
+    """Give the quickest tick of the state whose quickest tick is the slowest, µs.
+
+    Args:
+        times: (count,) durations of one subject, as `interleaved` gives them.
+        states: Number of states.
+    """
+    state = np.arange(times.size) % BLOCK % states
+    return max(float(times[state == k].min()) for k in np.unique(state))
+
+
 def _block(tick: Tick, states: list[tuple[np.ndarray, np.ndarray]], into: np.ndarray) -> None:
     many = len(states)
     durations = [0] * into.size

@@ -29,6 +29,9 @@ from opspace.scenario.events import Event, in_order
 SCENARIO = "humanoid"
 TAIL = 0.05
 """Time after a change that still belongs to it, s."""
+LANDING = "foot lands"
+UNNOTICED = 0.01
+"""Time for which a foot may have touched before its contact comes, s."""
 SETTLED = 0.05
 """Time after a touchdown in which planned and measured forces are not compared, s."""
 FIRMEST = 1e8
@@ -45,7 +48,7 @@ CHANGES: Mapping[str, tuple[str, int]] = MappingProxyType(
         "they swap back": ("swap torso, lean", 1),
         "lean out": ("remove lean", 0),
         "hand out": ("remove hand", 0),
-        "foot lands": ("insert right", 0),
+        LANDING: ("insert right", 0),
         "hand presses": ("insert palm", 0),
         "hand lets go": ("remove palm", 0),
     }
@@ -139,10 +142,11 @@ def measures(recording: Recording, scenario: Scenario) -> dict[str, float | None
         scenario: Its scenario, with the durations of the continuous variant.
 
     Returns:
-        Largest torque step of every change, N·m per tick; then the numbers of the whole run, which
+        Largest torque step of every change, N·m per tick, of one during which the foot lands until then;
+        then the numbers of the whole run, which
         `UNITS` names. None where the run was over before.
     """
-    spans = {name: _span(_event(scenario, name), recording) for name in CHANGES}
+    spans = _spans(scenario, recording)
     found: dict[str, float | None] = {
         name: None if span is None else largest_torque_step(recording, *span)
         for name, span in spans.items()
@@ -153,7 +157,7 @@ def measures(recording: Recording, scenario: Scenario) -> dict[str, float | None
     error = np.linalg.norm(recording.group("tasks/com/error"), axis=1)
     found["centre of mass, largest error"] = 1e3 * float(np.nanmax(error))
     found["centre of mass, rms error"] = 1e3 * float(np.sqrt(np.nanmean(error**2)))
-    found["force, measured less planned, rms"] = _apart(recording, spans["foot lands"])
+    found["force, measured less planned, rms"] = _apart(recording, spans[LANDING])
     found["friction and sole, largest use"] = float(np.nanmax(_columns(recording, "cone_use")))
     return found
 
@@ -207,7 +211,7 @@ def draw(runs: Mapping[str, RunResult], out: Path, *, progress: Any = None) -> l
 
     scenario = load_scenario(SCENARIO)
     shown = runs["transition"].recording
-    spans = {name: _span(_event(scenario, name), shown) for name in CHANGES}
+    spans = _spans(scenario, shown)
     changes = {name: span[0] for name, span in spans.items() if span is not None}
     recordings = {name: run.recording for name, run in runs.items()}
     save(humanoid_figure(recordings, changes), out / "humanoid.png")
@@ -230,6 +234,18 @@ def _event(scenario: Scenario, name: str) -> Event | None:
     what, number = CHANGES[name]
     found = [e for _, e in in_order(scenario.events) if f"{e.kind} {', '.join(e.tasks)}" == what]
     return found[number] if number < len(found) else None
+
+
+def _spans(scenario: Scenario, recording: Recording) -> dict[str, tuple[float, float] | None]:
+    """Tell from when to when every change takes place, None for those that do not."""
+    found = {name: _span(_event(scenario, name), recording) for name in CHANGES}
+    landing = found[LANDING]
+    if landing is not None:
+        touch = landing[0] - UNNOTICED
+        for name, span in found.items():
+            if span is not None and span[0] < touch < span[1]:
+                found[name] = span[0], touch
+    return found
 
 
 def _span(event: Event | None, recording: Recording) -> tuple[float, float] | None:

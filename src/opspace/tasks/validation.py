@@ -55,7 +55,7 @@ def numbers(value: ArrayLike, what: str) -> Array:
     try:
         found = np.array(value)
         if found.dtype.kind in _NUMERIC:
-            return found.astype(float)
+            return found.astype(float, copy=False)
     except (TypeError, ValueError, OverflowError):
         pass
     raise InputError(f"{what} must be numbers, not {shown(value)}")
@@ -120,8 +120,9 @@ def brief(numbers: ArrayLike) -> str:
 
 
 def _fits(got: tuple[int, ...], wanted: tuple[int | None, ...]) -> bool:
-    return len(got) == len(wanted) and all(
-        want is None or size == want for size, want in zip(got, wanted, strict=True)
+    return got == wanted or (
+        len(got) == len(wanted)
+        and all(want is None or size == want for size, want in zip(got, wanted, strict=True))
     )
 
 
