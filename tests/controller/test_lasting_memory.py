@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import opspace as osc
-from opspace.machine.answer_call import Answer
+from opspace.machine.answer_call import AnswerParts
 from opspace.plan.entries import ENTRIES, KERNELS
 
 WORDS = 8
@@ -21,7 +21,7 @@ def stack():
 def watched(entry, function, seen):
     """A kernel whose caller is held up, while others make arrays, before it begins."""
     records = [i for i, kind in enumerate(entry.takes) if kind not in (int, float)]
-    if entry.gives is Answer:  # one place for all that it needs
+    if entry.gives is AnswerParts:  # one place for all that it needs
         records = [entry.takes.index(np.ndarray) + 2]
 
     def call(*given):

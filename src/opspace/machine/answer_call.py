@@ -30,7 +30,7 @@ def layout_is_known() -> bool:
     return same and found == known and number == id(float)
 
 
-class Answer(ctypes.Structure):
+class AnswerParts(ctypes.Structure):
     """What such a function answers with; it is told where this is, and whoever calls keeps it.
 
     It is None where the kernel gives a number below zero, or an argument is no float, or no contiguous
@@ -118,7 +118,7 @@ class Python:
 
 
 def define_answer(module: ir.Module, symbol: str, kernel: int) -> None:
-    """Write the function, of a float, two arrays, and where its `Answer` is.
+    """Write the function, of a float, two arrays, and where its `AnswerParts` is.
 
     Args:
         module: Where it goes.
@@ -133,7 +133,7 @@ def define_answer(module: ir.Module, symbol: str, kernel: int) -> None:
     answer = builder.inttoptr(python("PyLong_AsLongLong", WORD, where), OBJECT)
 
     def own(name: str, kind: ir.Type = OBJECT) -> Any:
-        return _member(builder, answer, getattr(Answer, name).offset, kind)
+        return _member(builder, answer, getattr(AnswerParts, name).offset, kind)
 
     kinds = (time, own("number")), (q, own("array")), (v, own("array"))
     _go_on_where(builder, [_same(builder, _member(builder, x, TYPE), kind) for x, kind in kinds])

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
-from opspace.machine.answer_call import Answer
+from opspace.machine.answer_call import AnswerParts
 from opspace.machine.field_table import RecordTable
 from opspace.machine.sources import stamp
 
@@ -27,14 +27,14 @@ class KernelEntry(NamedTuple):
         module: Module of the kernel.
         name: Its name there.
         takes: Its arguments: float, int, ``numpy.ndarray``, or the table of a record.
-        gives: What it returns: int, or nothing; ``Answer`` is an int that Python gets an answer for.
+        gives: What it returns: int, or nothing; ``AnswerParts`` is an int that Python gets an answer for.
         releases: Whether other threads of Python may run while it does.
     """
 
     module: str
     name: str
     takes: tuple[Argument, ...]
-    gives: type[int] | type[Answer] | None = None
+    gives: type[int] | type[AnswerParts] | None = None
     releases: bool = False
 
     @property

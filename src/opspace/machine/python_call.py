@@ -9,7 +9,7 @@ from typing import Any
 from llvmlite import binding as llvm
 from llvmlite import ir
 
-from opspace.machine.answer_call import DOUBLE, OBJECT, WORD, Answer, Python, define_answer
+from opspace.machine.answer_call import DOUBLE, OBJECT, WORD, AnswerParts, Python, define_answer
 from opspace.machine.kernel_entry import KernelEntry
 from opspace.machine.processor import Processor
 
@@ -43,7 +43,7 @@ class PythonCalls:
     def __init__(self, entries: Mapping[KernelEntry, int], processor: Processor) -> None:
         module = ir.Module()
         for entry, address in entries.items():
-            if entry.gives is Answer:
+            if entry.gives is AnswerParts:
                 define_answer(module, entry.symbol, address)
             else:
                 _define(module, entry, address)

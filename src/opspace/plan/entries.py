@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from opspace.machine.answer_call import Answer
+from opspace.machine.answer_call import AnswerParts
 from opspace.machine.kernel_entry import KernelEntry
 from opspace.machine.library import Library
 from opspace.plan.quiet_records import QUIET
@@ -16,7 +16,7 @@ ENTRIES = (
         "opspace.kernels.quiet_tick",
         "quiet_tick",
         (float, np.ndarray, np.ndarray, QUIET, TICK),
-        gives=Answer,
+        gives=AnswerParts,
     ),
     KernelEntry(
         "opspace.kernels.many_states", "ticks", (float, TICK, STATES, int, int), releases=True

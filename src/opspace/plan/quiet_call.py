@@ -10,7 +10,7 @@ import numpy as np
 
 from opspace.command import Command, Status
 from opspace.kernels.columns import SOLVE
-from opspace.machine.answer_call import Answer
+from opspace.machine.answer_call import AnswerParts
 from opspace.machine.record import Handle, address_of
 from opspace.plan.entries import KERNELS
 from opspace.plan.plan import Plan
@@ -35,7 +35,7 @@ class QuietCall:
 
     def __init__(self, plan: Plan, quiet: Handle, statuses: Mapping[int, Status]) -> None:
         self._handles = quiet, plan.handle
-        self._answer = Answer(
+        self._answer = AnswerParts(
             base=SOLVE,
             block=address_of(plan.memory),
             size=plan.memory.nbytes,
