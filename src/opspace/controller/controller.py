@@ -233,6 +233,10 @@ class Controller(ReferenceController):
             return super().placings
         return plan.distances.layout.by_name(plan.distances.placings)
 
+    @property
+    def _inertia(self) -> np.ndarray:
+        return super()._inertia if self._laid_out is None else self._laid_out[1].tick.M
+
     def _added_by_robot(self) -> np.ndarray:
         if not self._robot_adds or self._bodies is None or self._laid_out is None:
             return super()._added_by_robot()

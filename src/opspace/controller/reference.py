@@ -339,7 +339,7 @@ class ReferenceController:
         if self._handover is None and self._integral is not None:
             self._integral.after(command, members)
         if self._fall is not None:
-            command = self._fall.after(command, self.stack.hindrance * MAY_GIVE_UP)
+            command = self._fall.after(command, self.stack.hindrance * MAY_GIVE_UP, self._inertia)
             self._last_torque = command.tau
         added, handover = self._added_by_robot(), self._handover
         if handover is None:
@@ -352,6 +352,11 @@ class ReferenceController:
             self._handover = None
             self._plain, self._quiet = self._needs_no_more(), None
         return command._replace(tau=tau, status=command.status | Status.HANDOVER)
+
+    @property
+    def _inertia(self) -> np.ndarray:
+        """Inertia (n, n) that the last tick was computed with, kg·m²."""
+        return self.robot.M
 
     def _added_by_robot(self) -> np.ndarray:
         """Torque that the robot adds to a command, (n,) N·m, finite whatever the model says."""

@@ -27,7 +27,7 @@ class KernelEntry(NamedTuple):
         module: Module of the kernel.
         name: Its name there.
         takes: Its arguments: float, int, ``numpy.ndarray``, or the table of a record.
-        gives: What it returns: int, or nothing; ``AnswerParts`` is an int that Python gets an answer for.
+        gives: What it returns: int or nothing; ``AnswerParts`` is an int that Python gets an answer of.
         releases: Whether other threads of Python may run while it does.
     """
 
