@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from opspace.bench.scenes import SCENES, Scene
-from opspace.bench.timing import interleaved, pinned
+from opspace.bench.timing import pinned
 from opspace.command import Command, Status
 from opspace.errors import InputError, unknown_name
 from opspace.robots.protocol import BASE, Robot
@@ -75,11 +75,11 @@ class Sampler:
 
 
 class Slowest(NamedTuple):
-    """Ticks of a scene, µs.
+    """Ticks of a scene, µs, each the quickest of several at one state.
 
     Attributes:
         usual: At the states that the scene is timed at.
-        drawn: At states of the whole workspace, the quickest of several each.
+        drawn: At states of the whole workspace.
         found: At the slowest states that the search has found.
         statuses: What happened there.
     """
@@ -106,8 +106,8 @@ def slowest(scene: Scene, count: int, seed: int = 0) -> Slowest:
     def tick(q: np.ndarray, v: np.ndarray) -> Command:
         return controller.step(t, q, v, wrenches=wrenches)
 
-    usual = scene.states(controller.robot)
-    for state in zip(*usual, strict=True):
+    usual = list(zip(*scene.states(controller.robot), strict=True))
+    for state in usual:
         tick(*state)
     sampler = Sampler(controller.robot, seed)
     drawn = [sampler.draw() for _ in range(max(count // 2, KEPT))]
@@ -118,14 +118,9 @@ def slowest(scene: Scene, count: int, seed: int = 0) -> Slowest:
     for state in climbed:
         statuses |= tick(*state).status
     again, found = (
-        interleaved({"": tick}, *there, 32 * KEPT)[""] for there in (usual, _stacked(climbed))
+        np.array([_quickest(tick, state) for state in there]) for there in (usual, climbed)
     )
     return Slowest(again, times, found, statuses)
-
-
-def _stacked(states: Sequence[State]) -> State:
-    """Put states into arrays, (states, nq) and (states, n)."""
-    return np.array([q for q, _ in states]), np.array([v for _, v in states])
 
 
 def _quickest(tick: Callable[[np.ndarray, np.ndarray], object], state: State) -> float:
