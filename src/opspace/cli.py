@@ -365,6 +365,10 @@ def bench(
     changes: Annotated[
         int, typer.Option(help="Time so many changes of a stack of each kind as well.", min=0)
     ] = 0,
+    worst: Annotated[
+        int,
+        typer.Option(help="Try so many states of each scene for its slowest ticks as well.", min=0),
+    ] = 0,
     against: Annotated[
         Path | None, typer.Option(help="JSON file of an earlier run to compare with.")
     ] = None,
@@ -378,7 +382,13 @@ def bench(
     out: Annotated[Path, typer.Option(help="Directory to write to.")] = Path("results/bench"),
 ) -> None:
     """Time the tick, in turns with the model's own calls and with other controllers."""
-    from opspace.bench import Benchmark, changes_table, compare_runs, run_benchmark
+    from opspace.bench import (
+        Benchmark,
+        changes_table,
+        compare_runs,
+        run_benchmark,
+        worst_table,
+    )
     from opspace.errors import InputError
     from opspace.plots import save
     from opspace.plots.benchmark import benchmark_figure
@@ -405,6 +415,9 @@ def bench(
     if changes:
         print()
         _print_table(*changes_table(changes))
+    if worst:
+        print()
+        _print_table(*worst_table(scenes or (), worst, core))
     if before is not None:
         print()
         _print_table(*compare_runs(before, found))

@@ -3,12 +3,21 @@
 import numpy as np
 import pytest
 
-from opspace.bench import SCENES, Benchmark, changes_table, compare_runs, run_benchmark
+from opspace.bench import (
+    SCENES,
+    Benchmark,
+    Sampler,
+    changes_table,
+    compare_runs,
+    run_benchmark,
+    worst_case,
+    worst_table,
+)
 from opspace.bench.timing import interleaved, slowest_state
 from opspace.controller.batch import cores
 from opspace.errors import InputError, UnknownNameError
 from opspace.plots.benchmark import benchmark_figure
-from opspace.robots import available_robots
+from opspace.robots import available_robots, load_robot
 
 INSTALLED = {info.name for info in available_robots() if info.installed}
 
@@ -100,3 +109,41 @@ def test_changes_of_the_stack_are_timed_beside_the_ticks_around_them():
     assert all(len(row) == len(heads) and float(row[-1]) > 0.0 for row in rows)
     with pytest.raises(InputError, match="at least once"):
         changes_table(0)
+
+
+@pytest.mark.parametrize("name", ["puma560", "talos"])
+def test_states_are_drawn_from_the_whole_workspace_and_steps_stay_in_it(name):
+    robot = load_robot(name)
+    sampler = Sampler(robot, seed=1)
+    states = [sampler.draw() for _ in range(200)]
+    states += [sampler.near(state, 0.3) for state in states]
+    lower, upper = (limit[6 * robot.floating_base :] for limit in (robot.q_lower, robot.q_upper))
+    q, v = (np.array(part) for part in zip(*states, strict=True))
+    q = q[:, -lower.size :]
+    assert np.all((q >= lower) & (q <= upper))
+    assert np.all(np.abs(v[:, -lower.size :]) <= robot.velocity_limit[-lower.size :])
+    part = (q - lower) / (upper - lower)
+    assert part.min() < 0.02
+    assert part.max() > 0.98
+    for state in states[:3]:
+        robot.update(*state)
+
+
+def test_the_search_finds_what_takes_long(monkeypatch):
+    """Where time is made up to grow with one joint, the search goes there."""
+    monkeypatch.setattr(worst_case, "_quickest", lambda tick, state: float(state[0][0]))
+    found = worst_case.slowest(SCENES["puma"], 1280)
+    assert found.found.size == worst_case.KEPT
+    assert np.median(found.found) > found.drawn.max()
+
+
+def test_the_worst_case_is_told_beside_the_usual():
+    heads, rows = worst_table(["puma"], 40)
+    assert [row[1] for row in rows] == ["usual", "drawn", "slowest"] * (len(rows) // 3)
+    assert {row[0] for row in rows} >= {"puma"}
+    assert all(len(row) == len(heads) for row in rows)
+    assert all(float(row[2]) <= float(row[3]) <= float(row[4]) for row in rows)
+    with pytest.raises(InputError, match="needs 32 states"):
+        worst_table(["puma"], 31)
+    with pytest.raises(UnknownNameError):
+        worst_table(["pandas"], 40)

@@ -77,7 +77,7 @@ def hard_torques(controller, stacks, t):
 
 def blend_of(controller, t):
     """Stacks of (task, level) pairs and their weights at time t, and every moving activation."""
-    members = controller.stack._transitions._ticked
+    members = controller.stack.transitions.ticked
     presences = [m.presence.value(t) for m in members]
     mixed = mixture(members, presences, t, controller._blending)
     stacks = {
@@ -123,7 +123,7 @@ def play(robot, steps, blending, ticks, advance, observer=None):
     q, v = advance(None)
     for tick in range(ticks):
         t = tick * DT
-        members = stack._transitions._ticked
+        members = stack.transitions.ticked
         program.play(tick, {m.task.name for m in members}, running_of(members, t))
         command = controller.step(t, q, v)
         if watching is not None:

@@ -143,6 +143,9 @@ def check_command(line):
         assert set((asked[1] or "all").split(",")) <= set(extras), line
     elif words[0] in {"cc", "c++"}:  # run by export/test_c_library
         assert words[-1] in {"hold", "arm/opspace*.c", "franka"}, line
+    elif words[:2] == ["colcon", "build"]:
+        package = words[words.index("--packages-select") + 1]
+        assert (ROOT / "ros2" / package / "package.xml").is_file(), line
     elif words[:2] == ["python", "-m"]:
         importlib.import_module(words[2]).parser().parse_args(words[3:])
     elif words[0] == "python":

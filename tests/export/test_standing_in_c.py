@@ -117,10 +117,42 @@ def test_a_tick_that_fails_brakes_from_the_torque_that_carried(tmp_path):
     )
 
 
+def with_a_pause(found):
+    """States of which those from 3 to 29 are nearly one: nothing gets better."""
+    first = None
+    for k, t, q, v in found:
+        first = (q, v) if k == 3 else first
+        yield (k, t, first[0].copy(), first[1] * (1.0 + 1e-4 * k)) if 3 <= k < 30 else (k, t, q, v)
+
+
+@with_cc
+@pytest.mark.parametrize("name", ["solo12", "talos"])
+def test_a_robot_that_falls_is_given_up_in_the_same_tick_with_the_same_torque(name, tmp_path):
+    rule = osc.FallRule(after=0.055, tilt=0.5)
+    controller, _, _ = standing(name, falling=rule)
+    robot, fell, contacts = controller.robot, [], list(controller.stack.contacts.values())
+    c = InC(tmp_path, standing(name, falling=rule)[0])
+    for k, t, q, v in with_a_pause(states(robot, 70, 0.05)):
+        if k == 3:
+            for contact in contacts:
+                controller.stack.remove(contact, duration=0.0)
+                assert c.touch(contact, 0, 0.0) == 0
+        if k in (30, 60):
+            for contact in contacts:
+                controller.stack.insert(contact, 0.0)
+                assert c.touch(contact, 1, 0.0) == 0
+            controller.restart()
+            c.library.opspace_restart(c.own)
+        if 45 <= k < 60:  # turned, and whatever else there is, by more than the tilt
+            q[3:7] = np.cos(0.3), np.sin(0.3), 0.0, 0.0
+        command, (status, tau) = controller.step(t, q, v), c.step(t, q, v)
+        np.testing.assert_array_equal(tau, command.tau, err_msg=f"tick {k}")
+        assert status == command.status
+        fell.append(bool(osc.Status.FALLING & status))
+    assert [fell[k] for k in (2, 29, 31, 44, 46, 59, 61)] == [0, 1, 0, 0, 1, 1, 0]
+
+
 def test_what_only_python_can_do_is_refused_by_name(tmp_path):
-    controller, (first, *_), _ = standing("solo12", falling=osc.FallRule())
-    with pytest.raises(osc.InputError, match="a rule of falling"):
-        osc.export_c(controller, tmp_path)
     controller, (first, *_), _ = standing("solo12")
     with pytest.raises(osc.UnknownNameError, match="contact"):
         osc.export_c(controller, tmp_path, absent=["foot"])

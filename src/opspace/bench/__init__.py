@@ -11,3 +11,6 @@ from opspace.bench.run_benchmark import run_benchmark as run_benchmark
 from opspace.bench.scenes import SCENES as SCENES
 from opspace.bench.stack_changes import changes_table as changes_table
 from opspace.bench.stack_changes import stack_changes as stack_changes
+from opspace.bench.worst_case import Sampler as Sampler
+from opspace.bench.worst_case import slowest as slowest
+from opspace.bench.worst_case import worst_table as worst_table

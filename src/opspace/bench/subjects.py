@@ -36,7 +36,11 @@ def subjects(scene: Scene, readable: bool = False) -> dict[str, Tick]:
     KERNELS.load()
     t = scene.time
     wrenches = scene.wrenches
-    found[LIBRARY] = lambda q, v: controller.step(t, q, v, wrenches=wrenches)
+    found[LIBRARY] = (
+        (lambda q, v: controller.step(t, q, v))
+        if wrenches is None
+        else (lambda q, v: controller.step(t, q, v, wrenches=wrenches))
+    )
     robot = scene.robot()
     found[MODEL] = _model_calls(robot)
     if readable:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from math import isfinite
 from types import MappingProxyType
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -46,9 +46,13 @@ from opspace.kernels.columns import (
     TASK_BIAS,
 )
 from opspace.law import PROFILES
+from opspace.machine.answer_call import layout_is_known
+from opspace.machine.record import Handle
 from opspace.plan.entries import KERNELS
 from opspace.plan.pack_contacts import ContactTick, PackedContacts, fits
 from opspace.plan.plan import Heritage, Plan, structure
+from opspace.plan.quiet_call import QuietCall
+from opspace.plan.quiet_records import QUIET
 from opspace.plan.read_report import CompiledReport
 from opspace.robots.adapter import AdapterBase
 from opspace.robots.bodies import make_dynamics
@@ -56,6 +60,7 @@ from opspace.robots.motion_axes import MotionAxes
 from opspace.robots.motor_range import motor_range
 from opspace.robots.rigid_model import RigidModel
 from opspace.stack import Blending, Member, Outlook, variables_of
+from opspace.stack.transitions import Transitions
 from opspace.tasks.obstacles import Placing
 from opspace.tasks.task import CHANGES
 from opspace.tasks.validation import finite, numbers
@@ -89,8 +94,14 @@ _Fixed: TypeAlias = tuple[
     Callable[[float, int], int],
 ]
 _LaidOut: TypeAlias = tuple[
-    tuple[Member, ...], Plan, int, Callable[[], np.ndarray], Callable[[], bytes]
+    tuple[Member, ...],
+    Plan,
+    int,
+    Callable[[], np.ndarray],
+    Callable[[], bytes],
+    QuietCall | None,
 ]
+_Quiet: TypeAlias = tuple[Callable[..., Any], int, object, Transitions, tuple[Member, ...], bool]
 
 
 class Controller(ReferenceController):
@@ -112,16 +123,32 @@ class Controller(ReferenceController):
     # What every tick needs, in one piece: reading an attribute takes as long as a line of local names.
     _fixed: _Fixed | None = None
     _laid_out: _LaidOut | None = None
+    _quiet: _Quiet | None  # earned by every tick that leaves nothing to look at
+    _told: Handle | None = None  # what decides that, as kernels see it; None where no tick is quiet
     _readable = False  # whether the tick before was the readable form's
     # What is laid out before it is needed, replaced as a whole and never changed: plans by structure,
     # and by the tasks (their identity, for which they are kept) how to take one up.
     _ready: Mapping[tuple[object, ...], Plan] = MappingProxyType({})
     _ahead: Mapping[int, tuple[Heritage, _LaidOut]] = MappingProxyType({})
 
-    def step(  # noqa: PLR0912, PLR0915 - one piece is fast
+    def step(
         self, t: float, q: ArrayLike, v: ArrayLike, *, wrenches: Wrenches | None = None
     ) -> Command:
         """Compute the torque for one state; see `ReferenceController.step`."""
+        quiet = self._quiet
+        if quiet is not None and wrenches is None:
+            tick, address, seen, transitions, members, plain = quiet
+            if CHANGES.last is seen and transitions.ticked is members:
+                command = tick(t, q, v, address)
+                if command is not None:
+                    return command if plain else self._finished(command, members)
+        return self._look(t, q, v, wrenches)
+
+    def _look(  # noqa: PLR0912, PLR0915 - one piece is fast
+        self, t: float, q: ArrayLike, v: ArrayLike, wrenches: Wrenches | None
+    ) -> Command:
+        """Tick with a look at everything that may have happened since the last one."""
+        self._quiet = None
         fixed = self._fixed
         if fixed is None:
             self.warm_up()
@@ -168,13 +195,14 @@ class Controller(ReferenceController):
                 return self._answer(t, members, STATUSES[timing])
             if forces is not None:
                 forces.moved = True
-        _, plan, address, torque, memory = laid_out
+        _, plan, address, torque, memory, quiet = laid_out
         if forces is not None and forces.moved:
             plan.remember()
             forces.moved = False
         if plan.moving or CHANGES.last is not plan.seen:
             if plan.distances is not None and not self._watches_all(plan):
-                _, plan, address, torque, memory = self._lay_out_anew(members)
+                laid_out = self._lay_out_anew(members)
+                _, plan, address, torque, memory, quiet = laid_out
             plan.refresh(robot, t)
         answer = tick(t, address) if observer is None else self._learn(t, observer)
         if answer < 0:
@@ -184,12 +212,16 @@ class Controller(ReferenceController):
         tau = torque()
         if stands:
             footing = self._stood(tau)
+        if quiet is not None and not plan.moving and forces is None and self._loading is None:
+            transitions, plain = self.stack.transitions, self._plain
+            self._quiet = quiet.tick, quiet.address, plan.seen, transitions, members, plain
         status = STATUSES[answer % SOLVE | timing]
         if timing and forces is not None:  # the tick knows what happened in it
             forces.after(status)
         # Bytes are copied in half the time of an array; the tuple's own constructor takes twice this.
         command = NEW(
-            Command, (t, tau, status, answer // SOLVE, CompiledReport(plan, memory(), footing))
+            Command,
+            (t, tau, status, answer // SOLVE, NEW(CompiledReport, (plan, memory(), footing))),
         )
         return command if self._plain else self._finished(command, members)
 
@@ -200,6 +232,10 @@ class Controller(ReferenceController):
         if plan is None or plan.distances is None:
             return super().placings
         return plan.distances.layout.by_name(plan.distances.placings)
+
+    @property
+    def _inertia(self) -> np.ndarray:
+        return super()._inertia if self._laid_out is None else self._laid_out[1].tick.M
 
     def _added_by_robot(self) -> np.ndarray:
         if not self._robot_adds or self._bodies is None or self._laid_out is None:
@@ -313,8 +349,20 @@ class Controller(ReferenceController):
             self._observer,
             KERNELS["tick"],
         )
+        if layout_is_known() and not (self._base or self._bodies is None or self._observer):
+            self._told = self._tell(robot)
         self.stack.foresee(self._lay_out_ahead)
         return seconds
+
+    def _tell(self, robot: AdapterBase) -> Handle:
+        """Let kernels see what else a tick must look at."""
+        watch, nothing = self._timing, np.zeros(0)
+        arrays = {"times": self.stack.transitions.times, "behind": robot.behind}
+        if watch is None:
+            arrays |= dict.fromkeys(("watch", "last_q", "last_v"), nothing)
+        else:
+            arrays |= {"watch": watch.watch, "last_q": watch.last_q, "last_v": watch.last_v}
+        return QUIET.make({}, arrays).handle()
 
     def _compiled_robot(self) -> MotionAxes | None:
         """Give the robot's arrays: computed by compiled code where it can, else by its library."""
@@ -405,7 +453,7 @@ class Controller(ReferenceController):
                 if before is not None and last is not None:
                     ramps = tuple(variable.ramp for variable in variables_of(copies))
                     heritage = plan.heritage(before, last.variables, outlook.variables, ramps)
-                    ahead[id(outlook.members)] = heritage, _laid_out(outlook.members, plan)
+                    ahead[id(outlook.members)] = heritage, self._collected(outlook.members, plan)
             before, last = plan, outlook
         for key, plan in known.items():
             if len(ready) < KEPT:
@@ -442,7 +490,13 @@ class Controller(ReferenceController):
         variables = variables_of(members)
         known = () if before is None else before.variables
         heritage = plan.heritage(before, known, variables, tuple(v.ramp for v in variables))
-        return heritage, _laid_out(members, plan)
+        return heritage, self._collected(members, plan)
+
+    def _collected(self, members: tuple[Member, ...], plan: Plan) -> _LaidOut:
+        """Collect what every tick of these tasks needs."""
+        quiet = None if self._told is None else QuietCall(plan, self._told, STATUSES)
+        tick = plan.tick
+        return members, plan, plan.handle.address, tick.tau.copy, plan.memory.tobytes, quiet
 
     def _leave(self, members: tuple[Member, ...]) -> None:
         """Let the readable form go on from the compiled one."""
@@ -542,8 +596,3 @@ class Controller(ReferenceController):
         option[KEEP_TORQUE] = float(self.torque_limits == "priority" and not self._base)
         option[BASE] = float(self._base)
         return option
-
-
-def _laid_out(members: tuple[Member, ...], plan: Plan) -> _LaidOut:
-    """Collect what every tick of these tasks needs."""
-    return members, plan, plan.handle.address, plan.tick.tau.copy, plan.memory.tobytes

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from opspace.contacts import GroundContact
 from opspace.controller.batch import check_count
+from opspace.controller.falling import FallWatch
 from opspace.controller.reference import ReferenceController
 from opspace.errors import InputError, unknown_name
 from opspace.plan.image import Image, image
@@ -38,6 +39,7 @@ class Exported(NamedTuple):
         base: Coordinates without a motor.
         contacts: What the robot may touch, packed in this order.
         there: Which of these it touches at first.
+        fall: What watches whether it falls, or None.
     """
 
     robot: AdapterBase
@@ -51,6 +53,7 @@ class Exported(NamedTuple):
     base: int
     contacts: tuple[GroundContact, ...]
     there: tuple[bool, ...]
+    fall: FallWatch | None
 
 
 def exported(
@@ -113,6 +116,7 @@ def exported(
         controller._base,
         contacts,
         tuple(contact.name not in absent for contact in contacts),
+        controller._fall,
     )
 
 
@@ -145,7 +149,6 @@ def _check(controller: ReferenceController) -> None:
     """Refuse by name what ticks of Python do and the exported one would leave out."""
     stack, limits = controller.stack, controller.stack.limits
     reasons = {
-        "a rule of falling": controller._fall is not None,
         "collisions: what is kept apart may move in Python only": controller.collisions is not None,
         "on_time_jump other than 'report'": controller._holds
         or (controller._timing is not None and controller._timing.policy != "report"),

@@ -63,6 +63,9 @@ class FallWatch:
 
     within the motors' limits: no step when it begins, nothing that pulls when it has.
 
+    Attributes:
+        numbers: How long it may be not balanced, s, cosine of the tilt, and the vertical in the base.
+
     Args:
         rule: The rule.
         robot: The robot.
@@ -71,7 +74,8 @@ class FallWatch:
 
     def __init__(self, rule: FallRule, robot: Robot, damping: float) -> None:
         self._rule, self._robot, self._damping = rule, robot, damping
-        self._upright = _vertical(robot.q_reference)
+        x, y, z = _vertical(robot.q_reference)
+        self.numbers = rule.after, math.cos(min(rule.tilt, math.pi)), x, y, z
         self._profile = Profile("quintic")
         self.forget()
 
@@ -82,54 +86,61 @@ class FallWatch:
         self._fell: float | None = None
         self._last = np.zeros(self._robot.nv)
 
-    def after(self, command: Command, given_up: float) -> Command:
+    def after(self, command: Command, given_up: float, M: np.ndarray) -> Command:
         """Look at a tick, and answer in its place once the robot falls.
 
         Args:
             command: The tick.
             given_up: What it gave up, in weights.
+            M: (n, n) inertia of its state, kg·m².
         """
         if self._fell is None:
-            if not self._falls(command, given_up):
+            if not self._falls(command, given_up, M):
                 self._last = command.tau
                 return command
             self._fell = command.t
-        tau = self._damped(command.t - self._fell)
+        tau = self._damped(command.t - self._fell, M)
         return command._replace(tau=tau, status=command.status | Status.FALLING)
 
-    def _falls(self, command: Command, given_up: float) -> bool:
+    def _falls(self, command: Command, given_up: float, M: np.ndarray) -> bool:
         if Status.NOT_BALANCED not in command.status:
             self._hopeless = None
         elif self._hopeless is None:
             self._hopeless = command.t
-            self._fastest, self._most = self._speed(), given_up
-        elif self._gets_better(given_up):
+            self._fastest, self._most = self._speed(M), given_up
+        elif self._gets_better(given_up, M):
             self._hopeless = command.t
-        lost = self._hopeless is not None and command.t - self._hopeless >= self._rule.after
-        turned = float(_vertical(self._robot.q) @ self._upright)
-        return lost or turned < math.cos(min(self._rule.tilt, math.pi))
+        after, cosine, *upright = self.numbers
+        lost = self._hopeless is not None and command.t - self._hopeless >= after
+        (x, y, z), (a, b, c) = _vertical(self._robot.q), upright
+        return lost or x * a + y * b + z * c < cosine
 
-    def _gets_better(self, given_up: float) -> bool:
+    def _gets_better(self, given_up: float, M: np.ndarray) -> bool:
         """Compare with the worst since it last got better; noise moves neither by that much."""
-        speed = self._speed()
+        speed = self._speed(M)
         slower, less = speed < self._fastest - SLOWER, given_up < self._most - LESS
         self._fastest = speed if slower else max(self._fastest, speed)
         self._most = given_up if less else max(self._most, given_up)
         return slower or less
 
-    def _speed(self) -> float:
+    def _speed(self, M: np.ndarray) -> float:
         """Speed of the centre of mass, m/s: the momentum over the mass, the base's rows of M v."""
-        M = self._robot.M
-        return float(np.linalg.norm(M[:3] @ self._robot.v) / M[0, 0])
+        square, v = 0.0, self._robot.v.tolist()
+        for row in M[:3].tolist():  # summed in this order in C, too
+            momentum = 0.0
+            for m, x in zip(row, v, strict=True):
+                momentum += m * x
+            square += momentum * momentum
+        return math.sqrt(square) / float(M[0, 0])
 
-    def _damped(self, since: float) -> np.ndarray:
+    def _damped(self, since: float, M: np.ndarray) -> np.ndarray:
         robot = self._robot
         limit = np.where(robot.actuated, robot.torque_limit, 0.0)
         left = 1.0 - self._profile(min(max(since, 0.0) / SLACKENING, 1.0)).value
-        tau = left * self._last - self._damping * robot.M.diagonal() * robot.v
+        tau = left * self._last - self._damping * M.diagonal() * robot.v
         return np.clip(np.nan_to_num(tau, nan=0.0), -limit, limit)
 
 
-def _vertical(q: np.ndarray) -> np.ndarray:
+def _vertical(q: np.ndarray) -> list[float]:
     """Give the vertical in the axes of the base, (3,)."""
-    return matrix_from_quaternion(tuple(np.asarray(q, dtype=float)[3:7].tolist()))[2]
+    return matrix_from_quaternion(tuple(np.asarray(q, dtype=float)[3:7].tolist()))[2].tolist()

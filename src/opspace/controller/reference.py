@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -139,7 +140,9 @@ class ReferenceController:
         self.torque_limits = torque_limits
         if period is None and on_time_jump != "report":
             raise InputError(f"on_time_jump={on_time_jump!r} needs the period of the ticks")
-        self._timing = None if period is None else Watchdog(period, on_time_jump)
+        self._timing = (
+            None if period is None else Watchdog(period, on_time_jump, robot.nq, robot.nv)
+        )
         self._scales = Scales(robot, singularity)
         self._integral: IntegralAction | None = None
         self._forces: WrenchInput | None = None
@@ -154,6 +157,9 @@ class ReferenceController:
         self._handover: Handover | None = None
         self._last_torque: np.ndarray | None = None
         self._loading: Loading | None = None
+        # What a quiet tick of compiled code needs; None as long as the last tick was none, or left
+        # something to look at. No default of the class: that is read ten times as slowly.
+        self._quiet: Any = None
         self._fall = self._watch_for(falling)
         self._plain = self._needs_no_more()
         self._observer = _observer(stack.limits, robot.nv, torque_limits)
@@ -262,6 +268,7 @@ class ReferenceController:
                 f"robot {robot.name!r} is not one of load_robot: what it carries is in its own model"
             )
         self._loading = Loading(robot, payload, duration)
+        self.stack.transitions.look()
 
     def _load(self, t: float) -> None:
         """Let a payload come or go on."""
@@ -307,6 +314,7 @@ class ReferenceController:
 
     def _begin(self, handover: Handover) -> None:
         self._handover, self._plain = handover, False
+        self.stack.transitions.look()
 
     def _joint_torque(self, tau: ArrayLike) -> np.ndarray:
         found = numbers(tau, "the torque")
@@ -331,7 +339,7 @@ class ReferenceController:
         if self._handover is None and self._integral is not None:
             self._integral.after(command, members)
         if self._fall is not None:
-            command = self._fall.after(command, self.stack.hindrance * MAY_GIVE_UP)
+            command = self._fall.after(command, self.stack.hindrance * MAY_GIVE_UP, self._inertia)
             self._last_torque = command.tau
         added, handover = self._added_by_robot(), self._handover
         if handover is None:
@@ -342,8 +350,13 @@ class ReferenceController:
         tau = handover.torque(command.t, command.tau - added, limit, added - middle)
         if handover.done:
             self._handover = None
-            self._plain = self._needs_no_more()
+            self._plain, self._quiet = self._needs_no_more(), None
         return command._replace(tau=tau, status=command.status | Status.HANDOVER)
+
+    @property
+    def _inertia(self) -> np.ndarray:
+        """Inertia (n, n) that the last tick was computed with, kg·m²."""
+        return self.robot.M
 
     def _added_by_robot(self) -> np.ndarray:
         """Torque that the robot adds to a command, (n,) N·m, finite whatever the model says."""

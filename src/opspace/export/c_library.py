@@ -10,14 +10,14 @@ from pathlib import Path
 import numpy as np
 
 from opspace.command import Status
-from opspace.controller import Controller
+from opspace.controller import Controller, falling
 from opspace.controller.exported import Exported, exported
 from opspace.controller.reference import ReferenceController
 from opspace.controller.watchdog import JUMP, MISSED
 from opspace.errors import InputError
 from opspace.kernels import columns, stance_columns
 from opspace.law import PROFILES, press_columns
-from opspace.law.scalars import NO_GROUP, TANH_EDGE
+from opspace.law.scalars import MAY_GIVE_UP, NO_GROUP, TANH_EDGE
 from opspace.machine.processor import host
 from opspace.plan.entries import KERNELS
 from opspace.plan.pack_task import Packed
@@ -163,6 +163,10 @@ def _layout() -> str:
         "TIME_LATE_PERIODS": MISSED,
         "HALF_TURN": np.pi,
         "TANH_EDGE": TANH_EDGE,
+        "FALL_SLACKENING": falling.SLACKENING,
+        "FALL_SLOWER": falling.SLOWER,
+        "FALL_LESS": falling.LESS,
+        "FALL_MAY_GIVE_UP": MAY_GIVE_UP,
         "CONTACT_MOTION_PART": contact_course.MOTION_PART,
         "CONTACT_STOP": contact_course.STOP,
         "CONTACT_CALMER": contact_course.CALMER,
@@ -222,6 +226,7 @@ def _source(name: str, found: Exported, profile: int) -> str:
         "const int quaternion": list(map(str, found.robot.description.quaternions)) or ["0"],
         **{f"const double contact_{i}": x for i, (_, x) in enumerate(touched)},
         "const opspace_contact contact": [words for words, _ in touched] or ["{0}"],
+        **_fall(found),
         "const opspace_field field": fields,
         "const opspace_run run": [f"{{{first}, {count}}}" for first, count in runs],
         "const uint64_t content": content,
@@ -235,7 +240,8 @@ def _source(name: str, found: Exported, profile: int) -> str:
         *map(str, (found.plan.n, found.robot.nq, len(tasks))),
         *("joint", "task", str(found.moves), str(profile), str(len(found.levels)), "level"),
         *(str(found.base), str(len(found.robot.description.quaternions)), "quaternion"),
-        *(str(len(found.contacts)), "contact", str(len(fields)), "field"),
+        *(str(len(found.contacts)), "contact", "fall" if found.fall else "0"),
+        *(str(len(fields)), "field"),
         *(repr(found.period), str(int(found.robot_adds))),
         *map(str, (words.size, found.image.handle, len(runs))),
         *("run", "content", str(found.image.addresses.size), "address"),
@@ -244,6 +250,14 @@ def _source(name: str, found: Exported, profile: int) -> str:
         f'{_written()}#include "{name}.h"\n\n{data}\n'
         f"const opspace_model {name} = {{\n{_wrapped(members)}}};\n"
     )
+
+
+def _fall(found: Exported) -> dict[str, list[str]]:
+    """Write the rule by which the robot is given up, where there is one."""
+    if found.fall is None:
+        return {}
+    after, cosine, *upright = map(_number, found.fall.numbers)
+    return {"const opspace_fall fall": [f"{{{after}, {cosine}, {{{', '.join(upright)}}}}}"]}
 
 
 def _contact(found: Exported, i: int) -> tuple[str, list[str]]:

@@ -10,6 +10,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
+import numpy as np
 from llvmlite import binding as llvm
 from llvmlite import ir
 from numba import types
@@ -18,7 +19,7 @@ from numba.core import config as settings
 from numba.core.compiler_lock import global_compiler_lock
 
 from opspace.machine.field_table import RecordTable
-from opspace.machine.handle_type import handle_type
+from opspace.machine.handle_type import array_at, array_type, handle_type
 from opspace.machine.kernel_entry import Argument, KernelEntry, stamp_of
 from opspace.machine.processor import Processor
 
@@ -32,7 +33,8 @@ LIBRARY = {
 STAMP = "opspace_stamp"
 """Symbol of the text that says what the object was made of; who links it compares."""
 
-NUMBERS = {float: types.float64, int: types.int64}
+VECTOR = array_type(np.dtype(float), 1)
+TYPES: dict[Any, Any] = {float: types.float64, int: types.int64, np.ndarray: VECTOR}
 
 
 def compile_objects(entries: Sequence[KernelEntry], processors: Sequence[Processor]) -> list[bytes]:
@@ -108,18 +110,28 @@ def _translation(entries: Sequence[KernelEntry]) -> str:
 
 
 def _type_of(argument: Argument) -> Any:
-    return handle_type(argument) if isinstance(argument, RecordTable) else NUMBERS[argument]
+    return handle_type(argument) if isinstance(argument, RecordTable) else TYPES[argument]
 
 
 def _define(entry: KernelEntry, found: Any, context: Any, module: Any) -> None:
     """Add the C function; the code for an exception is dropped, since kernels raise none."""
-    given = [context.get_value_type(kind) for kind in found.argtypes]
+    address, size = cgutils.voidptr_t, cgutils.intp_t
+    given: list[Any] = []
+    for kind in found.argtypes:
+        given += [address, size] if kind is VECTOR else [context.get_value_type(kind)]
     back = ir.VoidType() if entry.gives is None else context.get_value_type(found.restype)
     function = ir.Function(module, ir.FunctionType(back, given), entry.symbol)
     builder = ir.IRBuilder(function.append_basic_block())
     kernel = context.declare_function(module, found)
+    left = iter(function.args)
+    arguments = [
+        array_at(context, builder, VECTOR, next(left), [next(left)])
+        if kind is VECTOR
+        else next(left)
+        for kind in found.argtypes
+    ]
     _, result = context.call_conv.call_function(
-        builder, kernel, found.restype, found.argtypes, function.args
+        builder, kernel, found.restype, found.argtypes, arguments
     )
     if entry.gives is None:
         builder.ret_void()

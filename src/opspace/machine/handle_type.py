@@ -101,13 +101,18 @@ def _field(context: Any, builder: Any, kind: HandleType, value: Any, name: str) 
 
     if isinstance(field, HandleType):
         return builder.inttoptr(word(0), cgutils.voidptr_t)
-    array = make_array(field)(context, builder)
-    shape = [word(1 + i) for i in range(field.ndim)]
+    address = builder.inttoptr(word(0), cgutils.voidptr_t)
+    return array_at(context, builder, field, address, [word(1 + i) for i in range(field.ndim)])
+
+
+def array_at(context: Any, builder: Any, kind: Any, address: Any, shape: list[Any]) -> Any:
+    """Make an array, which is not counted, of an address and a shape."""
+    array = make_array(kind)(context, builder)
     itemsize = ir.Constant(cgutils.intp_t, WORD)
     strides = [itemsize]
     for extent in reversed(shape[1:]):
         strides.insert(0, builder.mul(strides[0], extent))
-    data = builder.inttoptr(word(0), array.data.type)
+    data = builder.bitcast(address, array.data.type)
     populate_array(array, data, shape, strides, itemsize, meminfo=None)
     return array._getvalue()
 

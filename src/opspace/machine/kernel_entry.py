@@ -6,10 +6,13 @@ import ctypes
 from collections.abc import Sequence
 from typing import Any, NamedTuple, TypeAlias
 
+import numpy as np
+
+from opspace.machine.answer_call import AnswerParts
 from opspace.machine.field_table import RecordTable
 from opspace.machine.sources import stamp
 
-Argument: TypeAlias = type[float] | type[int] | RecordTable
+Argument: TypeAlias = type[float] | type[int] | type[np.ndarray] | RecordTable
 
 _C: dict[Any, Any] = {float: ctypes.c_double, int: ctypes.c_int64, None: None}
 
@@ -17,20 +20,21 @@ _C: dict[Any, Any] = {float: ctypes.c_double, int: ctypes.c_int64, None: None}
 class KernelEntry(NamedTuple):
     """A compiled function that Python calls, with a C interface.
 
-    A number is passed as it is, a record by the address of its handle.
+    A number is passed as it is, an array of float64 by its address and its size, a record by the address
+    of its handle.
 
     Attributes:
         module: Module of the kernel.
         name: Its name there.
-        takes: Its arguments: float, int, or the table of a record.
-        gives: What it returns: int, or nothing.
+        takes: Its arguments: float, int, ``numpy.ndarray``, or the table of a record.
+        gives: What it returns: int or nothing; ``AnswerParts`` is an int that Python gets an answer of.
         releases: Whether other threads of Python may run while it does.
     """
 
     module: str
     name: str
     takes: tuple[Argument, ...]
-    gives: type[int] | None = None
+    gives: type[int] | type[AnswerParts] | None = None
     releases: bool = False
 
     @property

@@ -9,15 +9,14 @@ from typing import Any
 from llvmlite import binding as llvm
 from llvmlite import ir
 
+from opspace.machine.answer_call import DOUBLE, OBJECT, WORD, AnswerParts, Python, define_answer
 from opspace.machine.kernel_entry import KernelEntry
 from opspace.machine.processor import Processor
 
 FASTCALL = 0x80
 """Flag of Python's stable interface: arguments come as an array with their number."""
 
-_WORD, _DOUBLE = ir.IntType(64), ir.DoubleType()
-_ADDRESS = ir.IntType(8).as_pointer()
-_READ = {float: ("PyFloat_AsDouble", _DOUBLE), int: ("PyLong_AsLongLong", _WORD)}
+_READ = {float: ("PyFloat_AsDouble", DOUBLE), int: ("PyLong_AsLongLong", WORD)}
 
 
 class _Method(ctypes.Structure):
@@ -44,7 +43,10 @@ class PythonCalls:
     def __init__(self, entries: Mapping[KernelEntry, int], processor: Processor) -> None:
         module = ir.Module()
         for entry, address in entries.items():
-            _define(module, entry, address)
+            if entry.gives is AnswerParts:
+                define_answer(module, entry.symbol, address)
+            else:
+                _define(module, entry, address)
         # What was made lives as long as this does, and whoever calls keeps this.
         self._engine = llvm.create_mcjit_compiler(
             llvm.parse_assembly(str(module)), processor.machine()
@@ -64,21 +66,13 @@ class PythonCalls:
 
 def _define(module: ir.Module, entry: KernelEntry, address: int) -> None:
     """Write the function: read the arguments, call, make what it returns an int."""
-    read = [_READ.get(one, ("PyLong_AsLongLong", _WORD)) for one in entry.takes]
-    kernel = ir.FunctionType(_WORD if entry.gives else ir.VoidType(), [kind for _, kind in read])
-    call = ir.FunctionType(_ADDRESS, (_ADDRESS, _ADDRESS.as_pointer(), _WORD))
-    function = ir.Function(module, call, entry.symbol)
-    builder = ir.IRBuilder(function.append_basic_block())
-    given = []
-    for i, (name, kind) in enumerate(read):
-        one = builder.load(builder.gep(function.args[1], [_WORD(i)]))
-        given.append(builder.call(_of_python(module, name, kind, _ADDRESS), [one]))
-    found = builder.call(builder.inttoptr(_WORD(address), kernel.as_pointer()), given)
-    back = _of_python(module, "PyLong_FromLongLong", _ADDRESS, _WORD)
-    builder.ret(builder.call(back, [found if entry.gives else _WORD(0)]))
-
-
-def _of_python(module: ir.Module, name: str, gives: ir.Type, takes: ir.Type) -> Any:
-    if name in module.globals:
-        return module.get_global(name)
-    return ir.Function(module, ir.FunctionType(gives, [takes]), name)
+    read = [_READ.get(one, _READ[int]) for one in entry.takes]
+    kernel = ir.FunctionType(WORD if entry.gives else ir.VoidType(), [kind for _, kind in read])
+    call = ir.FunctionType(OBJECT, (OBJECT, OBJECT.as_pointer(), WORD))
+    builder = ir.IRBuilder(ir.Function(module, call, entry.symbol).append_basic_block())
+    python, arguments = Python(builder), builder.function.args[1]
+    given = [
+        python(name, kind, python.argument(arguments, i)) for i, (name, kind) in enumerate(read)
+    ]
+    found = builder.call(builder.inttoptr(WORD(address), kernel.as_pointer()), given)
+    builder.ret(python("PyLong_FromLongLong", OBJECT, found if entry.gives else WORD(0)))

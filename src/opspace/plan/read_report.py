@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -18,24 +19,22 @@ if TYPE_CHECKING:
     from opspace.plan.plan import Plan
 
 
-class CompiledReport:
-    """Tasks, levels and limits of one tick.
+class Written(NamedTuple):
+    """What one tick left for a report.
 
-    Args:
+    Attributes:
         plan: The plan of the tick.
         memory: The bytes of the block that the tick wrote.
         footing: The contacts of the tick.
     """
 
-    __slots__ = ("_footing", "_levels", "_memory", "_parts", "_plan", "_tasks")
+    plan: Plan
+    memory: bytes
+    footing: tuple[ContactTick, ...] = ()
 
-    def __init__(self, plan: Plan, memory: bytes, footing: tuple[ContactTick, ...] = ()) -> None:
-        self._plan = plan
-        self._footing = footing
-        self._memory = memory
-        self._parts: Reported | None = None
-        self._tasks: dict[str, TaskStatus] | None = None
-        self._levels: tuple[LevelStatus, ...] | None = None
+
+class CompiledReport(Written):
+    """Tasks, levels and limits of one tick."""
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Be copied as what is told: the plan is of this controller, and its memory of this process."""
@@ -47,52 +46,48 @@ class CompiledReport:
             ByName(self.contacts),
         )
 
-    @property
+    @cached_property
     def tasks(self) -> Mapping[str, TaskStatus]:
         """Status of each task by name."""
-        if self._tasks is None:
-            self._tasks = self._task_status()
-        return self._tasks
+        return self._task_status()
 
-    @property
+    @cached_property
     def levels(self) -> tuple[LevelStatus, ...]:
         """Status of each level where there is a task, most important first."""
-        if self._levels is None:
-            self._levels = self._level_status()
-        return self._levels
+        return self._level_status()
 
     @property
     def limits(self) -> Mapping[str, float]:
         """Activation of the joint limits that take part, by name."""
-        limits = self._plan.limits
+        limits = self.plan.limits
         if limits is None:
             return {}
-        found = self._found().numbers("limit_h")
+        found = self._found.numbers("limit_h")
         return {side.name: h for side, h in zip(limits.sides, found, strict=True) if h > 0.0}
 
     @property
     def contacts(self) -> Mapping[str, ContactStatus]:
         """Status of each contact by name."""
-        if not self._footing:
+        if not self.footing:
             return ByName()
-        found = self._found()
+        found = self._found
         told = found["contact_force"], found["contact_axes"], found.numbers("contact_use")
         return ByName(
             (footing.contact.name, footing.status(force, axes, use))
-            for footing, force, axes, use in zip(self._footing, *told, strict=False)
+            for footing, force, axes, use in zip(self.footing, *told, strict=False)
         )
 
     @property
     def distances(self) -> Mapping[str, Distance]:
         """Pairs of bodies that are kept apart, by name, the nearest first."""
-        distances = self._plan.distances
+        distances = self.plan.distances
         if distances is None:
             return ByName()
-        found = self._found()
+        found = self._found
         return distances.layout.status(found["distance"], found["distance_taken"])
 
     def _task_status(self) -> dict[str, TaskStatus]:
-        plan, found = self._plan, self._found()
+        plan, found = self.plan, self._found
         shares: list[dict[float, float]] = [{} for _ in plan.members]
         for (level, i, _), share in zip(plan.places, found.numbers("share"), strict=True):
             if share > 0.0:
@@ -106,7 +101,7 @@ class CompiledReport:
         return status
 
     def _level_status(self) -> tuple[LevelStatus, ...]:
-        plan, found = self._plan, self._found()
+        plan, found = self.plan, self._found
         shares = found.numbers("share")
         there = {place[0] for place, share in zip(plan.places, shares, strict=True) if share > 0.0}
         solved = zip(*map(found.numbers, ("scale", "top", "chosen", "width")), strict=True)
@@ -118,10 +113,9 @@ class CompiledReport:
             if level in there
         )
 
+    @cached_property
     def _found(self) -> Reported:
-        if self._parts is None:
-            self._parts = Reported(self._plan.size, self._memory)
-        return self._parts
+        return Reported(self.plan.size, self.memory)
 
     def _level(
         self,
@@ -134,7 +128,7 @@ class CompiledReport:
         chosen: float,
         width: float,
     ) -> LevelStatus:
-        plan = self._plan
+        plan = self.plan
         here = [s for s, place in enumerate(plan.places) if place[0] == level]
         if top <= 0.0:
             shown = [s for s in here if shares[s] > 0.0]

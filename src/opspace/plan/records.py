@@ -19,6 +19,7 @@ from opspace.plan.bound_records import BOUNDS
 from opspace.plan.contact_records import STANCE
 from opspace.plan.cycle_records import CYCLES
 from opspace.plan.distance_records import DISTANCES
+from opspace.plan.quiet_records import QUIET
 from opspace.robots.bodies import DYNAMICS, RIGID_BODIES
 
 SIZES = {
@@ -42,6 +43,9 @@ SIZES = {
     "corners": "corners that the blend can have",
     "widest": "the largest of rows + limits, n and 6 contacts, at least one",
     "states": "states of a batch",
+    "watched": "3 where ticks and states are watched, else 0",
+    "last_nq": "coordinates of a configuration there, else 0",
+    "last_n": "joints there, else 0",
     "told": "numbers that a robot tells: time, configuration, velocity, accepted torque",
     "ring": "cycles that a loop remembers",
     "given": "states that own activations are given for: one that stands for all, or all",
@@ -265,4 +269,5 @@ TABLES = (
     REMEMBERED,
     SPECTRUM,
     CYCLES,
+    QUIET,
 )

@@ -29,6 +29,9 @@ class AdapterBase(ABC):
 
     Every array handed out is read-only; ``q``, ``v``, ``M`` and ``bias`` are views that the next
     update overwrites, or the next question after `place`.
+
+    Attributes:
+        behind: (1,) not 0 where a state has been set for which the library has computed nothing yet.
     """
 
     _model: Any
@@ -76,7 +79,8 @@ class AdapterBase(ABC):
         # Writing through these takes half the time, and refuses every shape and kind but their own.
         self._q_memory, self._v_memory = self._q.data, self._v.data
         self._cache: dict[tuple[str, int | str], np.ndarray] = {}
-        self._behind = False
+        self.behind = np.zeros(1, np.int64)
+        self._behind = self.behind.data
         self._payload: Payload | None = None
         self._loads: dict[int, np.ndarray] = {}
         self._read: list[ref[Masses]] = []
@@ -228,8 +232,7 @@ class AdapterBase(ABC):
             masses = reference()
             if masses is not None:
                 masses.carry(self._loads)
-        self._cache.clear()
-        self._behind = True
+        self._behind[0] = 1
 
     def update(self, q: np.ndarray, v: np.ndarray) -> None:
         """Set the state and compute what every query needs.
@@ -247,8 +250,7 @@ class AdapterBase(ABC):
         self._v[:] = v
         for i in self.description.quaternions:
             self._q[i : i + 4] /= math.sqrt(q[i : i + 4] @ q[i : i + 4])
-        self._cache.clear()
-        self._behind = True
+        self._behind[0] = 1
         self.catch_up()
 
     def place(self, q: ArrayLike, v: ArrayLike) -> None:
@@ -262,9 +264,7 @@ class AdapterBase(ABC):
             TypeError: Something else than such an array.
             ValueError: An array of another shape.
         """
-        if self._cache:
-            self._cache.clear()
-        self._behind = True
+        self._behind[0] = 1
         # Views of memory compare form and shape faster than NumPy converts them.
         self._q_memory[:] = q  # pyright: ignore[reportArgumentType, reportCallIssue]
         self._v_memory[:] = v  # pyright: ignore[reportArgumentType, reportCallIssue]
@@ -287,8 +287,9 @@ class AdapterBase(ABC):
 
     def catch_up(self) -> None:
         """Run the dynamics at the state of the last `place`, unless that has been done."""
-        if self._behind:
-            self._behind = False
+        if self._behind[0]:
+            self._behind[0] = 0
+            self._cache.clear()
             self._compute()
             for frame, numbers in self._loads.items():
                 self._add_load(frame, numbers)
@@ -436,7 +437,7 @@ class AdapterBase(ABC):
         copy = self._fresh()
         copy.tool, copy._table = self.tool, self._table
         copy._payload, copy._loads = self._payload, dict(self._loads)
-        copy._behind = bool(self._loads)
+        copy._behind[0] = bool(self._loads)
         return copy
 
     def motion_axes(self) -> MotionAxes | None:
@@ -514,11 +515,11 @@ class AdapterBase(ABC):
         compute: Callable[[int], np.ndarray],
         of_added: Callable[[AddedFrame], np.ndarray] | None = None,
     ) -> np.ndarray:
+        self.catch_up()
         key = (what, frame)
         value = self._cache.get(key)
         if value is None:
             frame = self._known(frame)
-            self.catch_up()
             added = self._table.added.get(frame) if of_added is not None else None
             value = compute(frame) if of_added is None or added is None else of_added(added)
             value.setflags(write=False)

@@ -160,9 +160,14 @@ class Stack:
         return self._transitions.now
 
     @property
+    def transitions(self) -> Transitions:
+        """What happens to the tasks, for whoever ticks."""
+        return self._transitions
+
+    @property
     def members(self) -> tuple[Member, ...]:
         """The tasks of the last tick with their places, or those there are at the start."""
-        return self._transitions.present()
+        return self._transitions.ticked
 
     @property
     def contacts(self) -> Mapping[str, GroundContact]:

@@ -8,7 +8,10 @@ from collections import deque
 from collections.abc import Callable, Iterator
 from threading import Lock, RLock
 
+import numpy as np
+
 from opspace.errors import InputError, OpspaceError
+from opspace.kernels.quiet_columns import NEXT, NOW
 from opspace.stack.changes import Insert, Known, Request
 from opspace.stack.course import Course, Happening, Queued
 from opspace.stack.members import Member, Place, Variable
@@ -22,12 +25,18 @@ class Transitions:
     The controller's thread changes tasks in `begin_tick`; every other one adds to the queue. What
     will come of a request is gone through on copies by the thread that asks; a tick in which that
     happens has only to write it down.
+
+    Attributes:
+        times: (2,) time of the last tick, s, NaN before the first; and before which nothing happens
+            to the stack, −∞ as soon as something new is asked. A tick before that need not look here.
+        ticked: The tasks of the last tick, or those there are at the start; another object after every
+            change.
     """
 
     def __init__(self) -> None:
         self._course = Course({}, [], ())
-        self._now: float | None = None
-        self._ticked: tuple[Member, ...] = ()
+        self.times = np.array([math.nan, -math.inf])
+        self.ticked: tuple[Member, ...] = ()
         self._prepare: Callable[[Task], None] | None = None
         self._foresee: Callable[[Iterator[Outlook]], None] | None = None
         # Outcomes of the events to come, good as long as no other one happens before.
@@ -35,9 +44,6 @@ class Transitions:
         self._happened = 0
         # The first of them, once it is sure to be the next thing to happen.
         self._ripe: Foreseen | None = None
-        # Nothing happens to the stack before this time, unless something new is asked.
-        self._next = -math.inf
-        self._asked = False
         self._resuming, self._clock = False, 0
         # One request at a time is prepared, which takes long; the other lock is held briefly.
         self._requesting = RLock()
@@ -54,7 +60,7 @@ class Transitions:
                 f"two tasks are named {task.name!r}; give each a name of its own (name=...)"
             )
         self._course.members[task.name] = Member(task, Variable(1.0), (Place(level),))
-        self._ticked = tuple(self._course.members.values())
+        self.ticked = tuple(self._course.members.values())
 
     def levels(self) -> list[tuple[float, Task]]:
         """List the tasks, each with the level where it is or goes."""
@@ -64,7 +70,7 @@ class Transitions:
     def settled(self) -> bool:
         """Tell whether at the last tick nothing was on its way or due."""
         with self._lock:
-            now = -math.inf if self._now is None else self._now
+            now = self._time_or(-math.inf)
             due = any(queued.start <= now for queued in self._course.queue)
             return not due and all(member.settled(now) for member in self._course.members.values())
 
@@ -73,14 +79,15 @@ class Transitions:
         with self._lock:
             return bool(self._course.queue)
 
-    def present(self) -> tuple[Member, ...]:
-        """Return the tasks of the last tick, or those there are at the start."""
-        return self._ticked
-
     @property
     def now(self) -> float | None:
         """Time of the last tick, s, or None before the first."""
-        return self._now
+        now = float(self.times[NOW])
+        return None if math.isnan(now) else now
+
+    def _time_or(self, other: float) -> float:
+        """Return the time of the last tick, s, or something else before the first."""
+        return other if self.now is None else self.now
 
     def ask(self, request: Request) -> None:
         """Queue a request.
@@ -149,60 +156,63 @@ class Transitions:
             The tasks of this tick, which only the thread of the controller changes: the same
             object as at the tick before if nothing has begun, and no task or place gone, since.
         """
-        if t < self._next and not self._asked:
-            self._now = t
-            return self._ticked
-        if self._lock.acquire(blocking=self._resuming):  # which no tick can go on without
+        # Of two that come at once, the one that must not go on without the lock waits for it.
+        if not t < self.times[NEXT] and self._lock.acquire(blocking=self._resuming):
             try:
-                self._asked = False
                 if self._resuming:
                     self._resume(t)
                 self._let_happen(t)
             finally:
                 self._lock.release()
-        self._now = t
-        return self._ticked
+        self.times[NOW] = t
+        return self.ticked
+
+    def look(self) -> None:
+        """Let the next tick look here."""
+        with self._lock:
+            self.times[NEXT] = -math.inf
 
     def resume(self) -> None:
         """Let the next tick go on as if no time had passed since the one before."""
         with self._lock:
             self._clock += 1
-            self._resuming = self._asked = True
+            self._resuming = True
+            self.times[NEXT] = -math.inf
 
     def _resume(self, t: float) -> None:
         """Move everything that has a time on by the pause, and let tasks find anew what they hold."""
         self._resuming = False
-        if self._now is None:
+        if self.now is None:
             return
-        pause = t - self._now
+        pause = t - self.now
         self._course.wait(pause, t, self._clock)
         self._coming.clear()  # requests and ramps are others now
         self._ripe = None
-        self._now = t
-        self._ticked = tuple(self._course.members.values())  # another object, for its ramps
-        for member in self._ticked:
+        self.times[NOW] = t
+        self.ticked = tuple(self._course.members.values())  # another object, for its ramps
+        for member in self.ticked:
             member.task.resume(pause)
 
     def _let_happen(self, t: float) -> None:
         """Go through the events until time ``t`` [s], as foreseen where they are."""
-        course, before = self._course, t if self._now is None else self._now
+        course, before = self._course, self._time_or(t)
         if self._ripe is not None and course.following <= t < self._ripe.following:
             late = course.starts <= before
             if not late or course.arrives > t:  # else what arrives until then comes first
                 self._happen(self._ripe, t if late else course.following)
-                self._ripe, self._asked = None, True  # what follows is looked for in the next tick
+                self._ripe, self.times[NEXT] = None, -math.inf  # what follows is for the next tick
                 return
         course.look()
         at = -math.inf
         while course.following <= t:
-            event = course.next_event(t, self._now, at)
+            event = course.next_event(t, self.now, at)
             at = event.time
             if self._coming and self._coming[0].fits(event):
                 self._happen(self._coming[0], at)
                 course.look()
             else:
                 self._play(event)
-        self._next = course.following
+        self.times[NEXT] = course.following
         self._ripe = self._ripening(t)
 
     def _happen(self, outcome: Foreseen, time: float) -> None:
@@ -210,7 +220,7 @@ class Transitions:
         self._happened += 1
         self._coming.popleft()
         outcome.happen(self._course, time)
-        self._ticked = outcome.present
+        self.ticked = outcome.present
         for task in outcome.new:
             task.reset()
 
@@ -218,10 +228,10 @@ class Transitions:
         """Do what was not foreseen, after which nothing is any more."""
         self._happened += 1
         self._coming.clear()
-        before = self._ticked
+        before = self.ticked
         if self._course.play(event):
-            self._ticked = tuple(self._course.members.values())
-        for member in self._ticked:
+            self.ticked = tuple(self._course.members.values())
+        for member in self.ticked:
             if member not in before:
                 member.task.reset()
 
@@ -245,7 +255,7 @@ class Transitions:
             queue, happened = list(self._course.queue), self._happened
             if request is not None:
                 insort(queue, self._checked(request), key=lambda queued: queued.order)
-            rehearsal = Rehearsal(self._course, queue, self._ticked, self._now)
+            rehearsal = Rehearsal(self._course, queue, self.ticked, self.now)
         self._foresee(rehearsal.outlooks())
         return rehearsal.outcomes, happened
 
@@ -253,8 +263,8 @@ class Transitions:
         """Follow these outcomes, unless something else has happened meanwhile."""
         self._coming = deque(coming if happened == self._happened else ())
         self._course.look()
-        self._ripe = self._ripening(-math.inf if self._now is None else self._now)
-        self._asked = True
+        self._ripe = self._ripening(self._time_or(-math.inf))
+        self.times[NEXT] = -math.inf
 
     def _waiting(self) -> list[Task]:
         return [q.request.task for q in self._course.queue if isinstance(q.request, Insert)]
@@ -268,7 +278,7 @@ class Transitions:
             name: Known(member.task, member.level, member.leaving)
             for name, member in self._course.members.items()
         }
-        now = -math.inf if self._now is None else self._now
+        now = self._time_or(-math.inf)
         wanted = request.timing.start_time
         start = -math.inf if wanted is None else wanted
         new = Queued(max(start, now), start, request, self._clock)

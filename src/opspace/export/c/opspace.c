@@ -91,7 +91,7 @@ opspace *opspace_open(const opspace_model *model)
     c->words = calloc((size_t)model->words, sizeof *c->words);
     c->state = calloc((size_t)(model->nq + model->n), sizeof *c->state);
     if (!c->words || !c->state || !opspace_make_ring(c) || !opspace_make_places(c)
-        || !opspace_make_contacts(c)) {
+        || !opspace_make_contacts(c) || !opspace_make_fall(c)) {
         opspace_close(c);
         return NULL;
     }
@@ -113,6 +113,7 @@ void opspace_close(opspace *c)
         free(c->change);
         free(c->footing);
         free(c->touching);
+        free(c->fall.last);
     }
     free(c);
 }
@@ -213,7 +214,7 @@ static int normalise(const opspace *c, double *q)
     return 1;
 }
 
-static int64_t answered(opspace *c, int64_t answer, double *tau)
+static int64_t answered(opspace *c, double t, int64_t answer, double *tau)
 {
     const opspace_model *m = c->model;
     if (answer < 0) {
@@ -221,14 +222,16 @@ static int64_t answered(opspace *c, int64_t answer, double *tau)
         without_gravity(c, tau);
         return OPSPACE_FAULT;
     }
+    int64_t status = answer % ANSWER_SOLVE;
     memcpy(tau, c->tau, (size_t)m->n * sizeof *tau);
     without_gravity(c, tau);
     if (m->base > 0) {
+        c->hindrance = *c->stance.hindrance;
+        status |= opspace_watch_fall(c, t, status, tau);
         memcpy(c->last, tau, (size_t)m->n * sizeof *tau);
         c->carried = 1;
-        c->hindrance = *c->stance.hindrance;
     }
-    return answer % ANSWER_SOLVE;
+    return status;
 }
 
 int64_t opspace_step(opspace *c, double t, const double *q, const double *v, double *tau)
@@ -258,7 +261,7 @@ int64_t opspace_step(opspace *c, double t, const double *q, const double *v, dou
     if (m->base > 0)
         found |= opspace_touch(c);
     int64_t answer = opspace_tick(t, c->handle);
-    return found | answered(c, answer, tau);
+    return found | answered(c, t, answer, tau);
 }
 
 int opspace_find_task(const opspace *c, const char *name)
@@ -327,6 +330,7 @@ void opspace_restart(opspace *c)
         c->paused = 1;
     }
     c->begun = 0;
+    opspace_forget_fall(c);
     for (int i = 0; i < c->model->tasks; i++)
         c->kind[i * KIND_SIZE + KIND_REMEMBERS] = 0;
 }

@@ -41,6 +41,13 @@ typedef struct {
     const double *numbers;
 } opspace_contact;
 
+/* When a robot that stands is given up. */
+typedef struct {
+    double after;  /* s, not balanced without getting better */
+    double cosine; /* of how far its base may turn */
+    double upright[3];
+} opspace_fall;
+
 /* An array that can be read. */
 typedef struct {
     const char *name;
@@ -71,6 +78,7 @@ typedef struct {
     const int *quaternion; /* first coordinate of each */
     int contacts;
     const opspace_contact *contact;
+    const opspace_fall *fall; /* NULL is never */
     int fields;
     const opspace_field *field;
     double period; /* s, between two steps; 0 where none was announced */
@@ -98,7 +106,8 @@ void opspace_close(opspace *controller);
  *
  * Where the robot adds the torque against gravity, tau is what it adds that to.
  * Returns what happened, a sum of OPSPACE_ statuses, 0 in an ordinary tick. With OPSPACE_FAULT tau is
- * the torque against the bias with joint damping. OPSPACE_NOT_FINITE, negative: time or state is not
+ * the torque against the bias with joint damping. With OPSPACE_FALLING the robot is given up and its
+ * joints are damped, until opspace_restart. OPSPACE_NOT_FINITE, negative: time or state is not
  * finite or a quaternion has no direction, and tau is as it was; nor does it change with
  * OPSPACE_NO_WRENCH, a force task that has never been given one. */
 int64_t opspace_step(opspace *controller, double t, const double *q, const double *v, double *tau);

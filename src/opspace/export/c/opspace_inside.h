@@ -90,6 +90,11 @@ struct opspace {
     int touches;
     double hindrance;
     struct {
+        int hopeless, fell;
+        double since, fell_at, fastest, most;
+        double *last; /* torque of the last step in which it stood */
+    } fall;
+    struct {
         int64_t *count, *rows, *place, *edges;
         double *numbers, *motion, *force, *most, *cone, *metric, *reference, *hindrance;
     } stance;
@@ -130,5 +135,10 @@ int opspace_make_contacts(opspace *c);
 void opspace_let_touch(opspace *c, int contact, int present, double duration, int waits);
 void opspace_move_contacts(opspace *c, double passed);
 int64_t opspace_touch(opspace *c);
+
+/* opspace_falling.c: when it is given up. */
+int opspace_make_fall(opspace *c);
+void opspace_forget_fall(opspace *c);
+int64_t opspace_watch_fall(opspace *c, double t, int64_t status, double *tau);
 
 #endif
