@@ -212,7 +212,7 @@ def test_a_level_that_comes_with_nothing_changes_nothing(seed):
 
 @given(seeds)
 def test_bounds_that_are_nearly_one_are_kept_as_one_however_hard_they_are(seed):
-    """Softer than nothing but rounding: what a bound adds to those that it is nearly one with is noise."""
+    """Softer than nothing but rounding: what one adds to those that it is nearly one with is noise."""
     rng = np.random.default_rng(seed)
     n = int(rng.integers(2, 6))
     rows = rng.normal(size=(n, n))

@@ -28,6 +28,9 @@ LAMBDA = re.compile(r"^(static constexpr auto \w+ = \[\]\([^)]*\)) \{$", re.M)
 ROLLED = {"cpu": '_Pragma("clang loop unroll(disable)")', "cuda": '_Pragma("unroll 1")'}
 """Loops stay loops: rolled out they take a compiler many times as long."""
 
+EXACT = tuple(f"opspace.kernels.{name}" for name in ("dynamics", "projection", "room_below"))
+"""Modules that count with sixteen digits in every fleet, as `opspace.fleet.layout.DIGITS` do."""
+
 OPTIONS = {
     "cpu": (("optimization_level", 1), ("cpu_compiler_flags", "-march=native")),
     "cuda": (),
@@ -161,4 +164,4 @@ def _row(array: str) -> str:
 
 @cache
 def _translated(dtype: str, given: bool) -> tuple[str, str]:
-    return translate(robot_tick, constants_of(dtype), INSTEAD if given else {})
+    return translate(robot_tick, constants_of(dtype), INSTEAD if given else {}, EXACT)
