@@ -28,9 +28,10 @@ BEGUN = ("kind", "numbers", "limit")
 """What the plan begins and a tick goes on with, each robot for itself."""
 EMPTY = (
     *("U", "motors", "M", "bias", "placement", "velocity", "acceleration", "force", "inertia"),
-    *("count", "rows", "remembered", "spring"),
+    *("count", "rows", "remembered", "spring", "kp", "kv"),
 )
-"""What a tick does not write everywhere and reads as zero there: a fleet stands on nothing."""
+"""What a tick does not write everywhere and reads as zero there: a fleet stands on nothing, and springs
+have no gains."""
 
 DIGITS = ("dynamics", "later", "bounds")
 """Records that count with sixteen digits in every fleet. Inertias seen from the origin of the world lose
