@@ -71,8 +71,6 @@ def check_task(task: Task, *, given: bool) -> TrackingTask:
             f"{what} has an activation of its own, which is Python; write what it would give into "
             f"fleet[{task.name!r}].activation"
         )
-    if task.ki is not None:
-        raise InputError(f"{what} has integral action (ki), which a fleet has not")
     if task.max_acceleration is not None:
         raise InputError(
             f"{what} goes to new targets on a way (max_acceleration), which a fleet does not; move "

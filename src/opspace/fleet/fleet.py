@@ -124,6 +124,7 @@ class Fleet:
             self.M, self.bias = self._zeros((count, n, n)), self._zeros((count, n))
         self.status = wp.zeros(count, dtype=wp.int32, device=self.device)
         self.hard_solves = wp.zeros(count, dtype=wp.int32, device=self.device)
+        self._ended = wp.full(count, np.nan, dtype=wp.float64, device=self.device)
         self._time = wp.zeros(1, dtype=wp.float64, device=self.device)
         self._plan: Plan | None = None
         self._lay_out()
@@ -166,7 +167,8 @@ class Fleet:
             tau: (count, n) where to write the torques, N·m; None is ``self.tau``.
 
         Returns:
-            ``tau``, or ``self.tau``; always finite. A robot whose state or target is not finite gets
+            ``tau``, or ``self.tau``; always finite. A robot whose state or target is not finite, or
+            one of whose gains is negative, gets
             the braking torque that `Controller.step` gives with ``Status.FAULT``.
 
         Raises:
@@ -342,7 +344,9 @@ class Fleet:
         assert self._plan is not None
         given = (self.M, self.bias) if self.given else None
         arrays = list(self._arrays.values())
-        return FleetProgram(self._plan, arrays, self.dtype, self.device, kind, given=given)
+        return FleetProgram(
+            self._plan, arrays, self.dtype, self.device, kind, ended=self._ended, given=given
+        )
 
     def _lay_out(self) -> None:
         """Make the plan, the kernel and the arrays for the tasks and levels that there are."""

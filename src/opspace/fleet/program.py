@@ -10,6 +10,7 @@ import numpy as np
 
 from opspace.fleet.fleet_kernel import fleet_kernel
 from opspace.fleet.given_motion import INSTEAD
+from opspace.fleet.integral_sums import WITHOUT
 from opspace.fleet.kernels_in_cpp import translate
 from opspace.fleet.layout import RobotLayout
 from opspace.fleet.one_robot import robot_tick
@@ -49,6 +50,7 @@ class FleetProgram:
         device: Where the arrays are.
         kind: What the kernel is for, ``"cpu"`` or ``"cuda"``.
         given: Inertia and bias of every robot if dynamics are given, M and bias.
+        ended: (count,) of float64, when the last tick of every robot was, s.
         poison: Begin all memory as numbers that are none, so that whatever is read before it is
             written shows.
 
@@ -67,6 +69,7 @@ class FleetProgram:
         device: Any,
         kind: str,
         *,
+        ended: Any,
         given: tuple[Any, Any] | None = None,
         poison: bool = False,
     ) -> None:
@@ -78,7 +81,11 @@ class FleetProgram:
         self._addresses: list[int] = []
         self._first = layout.integers.size
         lines = _lines(plan, arrays, given, self._address)
-        code, name = _translated(dtype, given is not None)
+        integrates = any(task.integrates for task in arrays)
+        if integrates:
+            timing = _time_lines(arrays, self._address(ended))
+            lines = lines[0] + timing[0], lines[1] + timing[1]
+        code, name = _translated(dtype, given is not None, integrates)
         text = "\n".join(
             [
                 f"typedef {'double' if dtype == 'float64' else 'float'} real;",
@@ -150,6 +157,15 @@ def _lines(
     return before, after
 
 
+def _time_lines(arrays: list[TaskArrays], ended: str) -> tuple[list[str], list[str]]:
+    """Write what integrals need: how long it is since the tick before, and which tasks have none."""
+    last = f"((double*){ended})[i]"
+    now = "(times.shape[0] > 1 ? times.data[i] : times.data[0])"
+    before = [f"robot.since_()(0) = real({now} - {last});"]
+    before += [f"robot.ki_()({i}) = 0;" for i, task in enumerate(arrays) if not task.integrates]
+    return before, [f"{last} = {now};"]
+
+
 def _for_compiler(text: str, kind: str) -> str:
     """Say what a compiler shall leave as it is."""
     text = LOOP.sub(rf"\1{ROLLED[kind]} \2", text)
@@ -163,5 +179,6 @@ def _row(array: str) -> str:
 
 
 @cache
-def _translated(dtype: str, given: bool) -> tuple[str, str]:
-    return translate(robot_tick, constants_of(dtype), INSTEAD if given else {}, EXACT)
+def _translated(dtype: str, given: bool, integrates: bool) -> tuple[str, str]:
+    instead = {**(INSTEAD if given else {}), **({} if integrates else WITHOUT)}
+    return translate(robot_tick, constants_of(dtype), instead, EXACT)
