@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from opspace.fleet.exact_limits import EXACTLY, rests_of
 from opspace.fleet.fleet_kernel import fleet_kernel
 from opspace.fleet.given_motion import INSTEAD
 from opspace.fleet.integral_sums import WITHOUT
@@ -85,6 +86,13 @@ class FleetProgram:
         if integrates:
             timing = _time_lines(arrays, self._address(ended))
             lines = lines[0] + timing[0], lines[1] + timing[1]
+        numbers = layout.numbers
+        if dtype == "float32":
+            lines[0].append(
+                f"for (int k = 0; k < {sizes['limits']}; ++k) "
+                f"robot.limit_rest_().p[k] = fixed[{numbers.size} + k];"
+            )
+            numbers = np.concatenate([numbers, rests_of(plan.tick.limit)])
         code, name = _translated(dtype, given is not None, integrates)
         text = "\n".join(
             [
@@ -102,7 +110,7 @@ class FleetProgram:
         )
         self.kernel = fleet_kernel(_for_compiler(text, kind), dtype, OPTIONS[kind])
         self.memory = layout.memory_of(np.dtype(dtype).itemsize)
-        self.fixed = wp.array(layout.numbers, dtype=real, device=device)
+        self.fixed = wp.array(numbers, dtype=real, device=device)
         whole = np.concatenate([layout.integers, np.array(self._addresses, np.int64)])
         self.whole = wp.array(whole, dtype=wp.int64, device=device)
 
@@ -181,4 +189,6 @@ def _row(array: str) -> str:
 @cache
 def _translated(dtype: str, given: bool, integrates: bool) -> tuple[str, str]:
     instead = {**(INSTEAD if given else {}), **({} if integrates else WITHOUT)}
+    if dtype == "float32":
+        instead |= EXACTLY
     return translate(robot_tick, constants_of(dtype), instead, EXACT)
