@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import opspace as osc
-from tests.fleet.fleets import Beside
+from tests.fleet.fleets import Beside, tasks
 
 pytest.importorskip("warp", reason="fleets run in Warp: pip install 'opspace[gpu]'")
 
@@ -82,6 +82,48 @@ def test_targets_and_gains_of_each_robot():
         both.assert_same(0.001 * k, *both.states(rng))
 
 
+def integrals(robot):
+    """Integrals above and below, in the axes of the tool, of some rows, and of joints."""
+    pose = osc.PoseTask(
+        ki=300.0, max_integral=1e-3, max_speed=(0.2, 0.5), axes_frame="tool", name="pose"
+    )
+    later = osc.JointTask(robot.joint_names[2], ki=90.0, name="elbow")
+    return [pose, osc.PostureTask(kp=20.0, ki=50.0)], later
+
+
+def test_integrals_of_each_robot():
+    both = Beside(make=integrals, torque_limits="report")
+    both.fleet.insert(both.later, 0, robots=[])
+    rng = np.random.default_rng(12)
+    Q, V = both.states(rng, 0.6, 0.2)
+    Q[3:, 4], V[3:, 4] = [0.0, 0.05, 0.15], 0.01  # wrists that are singular or nearly so
+    seen = 0
+    for k in range(60):
+        if k == 10:
+            both.fleet["pose"].set_gains(60.0, robots=[1])
+            both.stacks[1]["pose"].kp = 60.0
+            both.fleet["pose"].ki.assign(np.full(both.count, 300.0))
+        for when, ask in ((15, "insert"), (35, "remove"), (45, "insert")):
+            if k == when:
+                given = (0, 0.01) if ask == "insert" else (0.01,)
+                getattr(both.fleet, ask)(both.later, *given, robots=[0, 2])
+                for i in (0, 2):
+                    getattr(both.stacks[i], ask)(both.others[i], *given)
+        jump = 0.06 if k == 20 else 0.0  # longer ago than one torque says anything about
+        commands = both.assert_same(0.002 * k + jump * (k >= 20), Q + 0.002 * k * V, V)
+        for i, stack in enumerate(both.stacks):
+            for task in stack:
+                told = both.fleet[task.name].integral.numpy()[i]
+                np.testing.assert_allclose(told, task.integral, rtol=0, atol=1e-9)
+        seen |= int(np.bitwise_or.reduce([int(command.status) for command in commands]))
+    assert osc.Status.DIRECTION_OFF in osc.Status(seen)
+    for name in ("pose", "posture", "elbow"):
+        assert np.abs(both.fleet[name].integral.numpy()).max() > 1e-3
+    both.fleet.reset(robots=[3])
+    both.fleet.step(0.3, Q, V)
+    np.testing.assert_array_equal(both.fleet["pose"].integral.numpy()[3], np.zeros(6))
+
+
 def springs(robot):
     """A spring for a pose in the axes of the tool, and one for a point on the arm below it."""
     point = osc.ImpedanceTask(robot.frame_names[-3], [0.1, 0.2, 0.3], force=[1, 2, 3], name="point")
@@ -151,22 +193,22 @@ def test_a_robot_that_is_reset_begins_anew_and_no_other_robot_notices():
 
 def test_single_precision():
     double, single = (Beside(400, d, alone=True).prepare() for d in ("float64", "float32"))
-    rng = np.random.default_rng(5)
+    rng, lost = np.random.default_rng(5), 0
     for spread in (0.5, 1.0, 3.0):
         Q, V = single.states(rng, spread)
         want = double.fleet.step(0.0, Q.astype(float), V.astype(float)).numpy()
         tau = single.fleet.step(0.0, Q, V).numpy()
         assert np.isfinite(tau).all()
         assert (np.abs(tau) <= single.robot.torque_limit.astype(np.float32)).all()
-        # Where bounds contradict each other their softness decides, which digits limit.
-        kept = double.fleet.status.numpy() & int(osc.Status.LIMIT_LOST) == 0
         error = np.abs(tau - want).max(axis=1) / np.abs(want).max(axis=1)
-        assert kept.sum() > 200
-        assert np.median(error[kept]) < 2e-6
-        assert np.quantile(error[kept], 0.99) < 2e-5
-        assert error[kept].max() < 1e-3
+        kept = double.fleet.status.numpy() & int(osc.Status.LIMIT_LOST) == 0
+        lost += int((~kept).sum())
+        assert np.median(error) < 1e-6
+        assert np.quantile(error[kept], 0.99) < 1e-5
+        assert error.max() < 1e-3
         double.fleet.reset()
         single.fleet.reset()
+    assert lost > 100, "bounds that contradict each other, as well"
 
 
 def test_times_on_the_device_and_a_place_for_the_torques():
@@ -186,11 +228,30 @@ def test_times_on_the_device_and_a_place_for_the_torques():
     assert (wide[:, 0] == 0.0).all()
 
 
+@pytest.mark.parametrize("what", ["stiffness", "damping_ratio", "kp", "kv"])
+def test_a_robot_with_a_negative_gain_brakes_and_the_others_go_on(what):
+    both, fair = (Beside(make=springs, alone=True) for _ in range(2))
+    Q, V = both.states(np.random.default_rng(13))
+    gain = getattr(
+        both.fleet["pose" if what in ("stiffness", "damping_ratio") else "posture"], what
+    )
+    wrong = gain.numpy().copy()
+    wrong[2] = -1e-9
+    gain.assign(wrong)
+    tau, want = both.fleet.step(0.0, Q, V).numpy(), fair.fleet.step(0.0, Q, V).numpy()
+    status = both.fleet.status.numpy()
+    assert [osc.Status.FAULT in osc.Status(int(s)) for s in status] == [k == 2 for k in range(6)]
+    np.testing.assert_array_equal(np.delete(tau, 2, 0), np.delete(want, 2, 0))
+    target = fair.fleet["pose"].target.numpy().copy()
+    target[2] = np.nan
+    fair.fleet["pose"].target.assign(target)
+    np.testing.assert_array_equal(tau[2], fair.fleet.step(0.0, Q, V).numpy()[2])
+
+
 REFUSED = {
     "needs a wrench": lambda: osc.ForceTask(name="press"),
     "reference in time": lambda: osc.PositionTask(target=osc.Circle([0.4, 0.0, 0.3], 0.1, 2.0)),
     "activation of its own": lambda: with_activation(osc.PositionTask()),
-    "integral action": lambda: osc.PositionTask(ki=10.0),
     "on a way": lambda: osc.PositionTask(max_speed=0.3, max_acceleration=1.0),
     "observer_time": lambda: osc.JointLimits(observer_time=0.005),
 }
@@ -247,16 +308,22 @@ def test_wrong_input_is_refused_by_name():
 
 
 @pytest.mark.slow
-def test_nothing_is_read_before_it_is_written():
+@pytest.mark.parametrize("make", [tasks, springs, integrals])
+def test_nothing_is_read_before_it_is_written(make):
     from opspace.fleet.program import FleetProgram
 
-    clean, poisoned = Beside(64, alone=True).prepare(), Beside(64, alone=True).prepare()
+    clean, poisoned = (Beside(64, alone=True, make=make) for _ in range(2))
+    if make is tasks:
+        clean.prepare()
+        poisoned.prepare()
     fleet, rng = poisoned.fleet, np.random.default_rng(9)
     Q, V = clean.states(rng)
     clean.fleet.step(0.0, Q, V), fleet.step(0.0, Q, V)
     arrays = list(fleet)
     plan = fleet._controller.plan_apart(fleet._roster.present)
-    fleet._program = FleetProgram(plan, arrays, fleet.dtype, fleet.device, "cpu", poison=True)
+    fleet._program = FleetProgram(
+        plan, arrays, fleet.dtype, fleet.device, "cpu", ended=fleet._ended, poison=True
+    )
     for k in range(8):
         Q, V = clean.states(rng, spread=0.4 * k, speed=2.0)
         tau = fleet.step(0.001 * k, Q, V).numpy()

@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 
 from opspace.kernels.inertia import factor
 from opspace.kernels.projection import nearest_acceleration as compiled
+from opspace.kernels.projection import project_on_bounds
 from opspace.law import nearest_acceleration, task_metric
 from opspace.law.hierarchy import Level, WhitenedTask
 from opspace.law.nearest import nearest_point
@@ -207,3 +208,23 @@ def test_a_level_that_comes_with_nothing_changes_nothing(seed):
         assert np.array_equal(task_metric(whitened, levels, h, 5), absent)
         h[k] = 1e-9
         assert np.allclose(task_metric(whitened, levels, h, 5), absent, rtol=1e-6, atol=1e-6)
+
+
+@given(seeds)
+def test_bounds_that_are_nearly_one_are_kept_as_one_however_hard_they_are(seed):
+    """Softer than nothing but rounding: what one adds to those that it is nearly one with is noise."""
+    rng = np.random.default_rng(seed)
+    n = int(rng.integers(2, 6))
+    rows = rng.normal(size=(n, n))
+    x, most = rng.normal(0.0, 10.0, n), rng.normal(0.0, 10.0, n)
+    rows /= np.linalg.norm(rows, axis=1)[:, None]
+    beside = np.tile(rows, (4, 1)) + rng.normal(0.0, 1e-10, (4 * n, n))
+    bounds = BOUNDS.make({"n": n, "distances": 0})
+    bounds.normal[:] = beside / np.linalg.norm(beside, axis=1)[:, None]
+    bounds.bound[:] = np.tile(most, 4)
+    bounds.softness[:], bounds.factor[:] = 1e-18, np.nan
+    bounds.x[:] = x
+    project_on_bounds(4 * n, n, 0, bounds.normal, bounds.handle())
+    want, _ = nearest_point(x, rows, most, np.full(n, HARD))
+    size = (1.0 + np.linalg.norm(x) + np.linalg.norm(want)) * np.linalg.cond(rows) ** 2
+    assert np.linalg.norm(bounds.y - want) <= 1e-7 * size

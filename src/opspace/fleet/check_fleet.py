@@ -30,6 +30,25 @@ def check_robot(controller: Controller) -> None:
 
 
 DYNAMICS = ("own", "given")
+MOST_MEMORY = 512 * 1024
+"""Bytes of local memory that CUDA gives a thread at most."""
+
+
+def check_memory(robot: str, memory: int) -> None:
+    """Check that a thread of a graphics card has room for what a robot works in.
+
+    Args:
+        robot: Name of the robot.
+        memory: Bytes that each robot has for itself.
+
+    Raises:
+        InputError: It has not.
+    """
+    if memory > MOST_MEMORY:
+        raise InputError(
+            f"each {robot!r} of this fleet works in {memory} B, and a thread of a graphics card has "
+            f"{MOST_MEMORY} B; give the stack fewer rows and levels, or the fleet device='cpu'"
+        )
 
 
 def check_dynamics(dynamics: str, period: float | None) -> bool:
@@ -71,8 +90,6 @@ def check_task(task: Task, *, given: bool) -> TrackingTask:
             f"{what} has an activation of its own, which is Python; write what it would give into "
             f"fleet[{task.name!r}].activation"
         )
-    if task.ki is not None:
-        raise InputError(f"{what} has integral action (ki), which a fleet has not")
     if task.max_acceleration is not None:
         raise InputError(
             f"{what} goes to new targets on a way (max_acceleration), which a fleet does not; move "

@@ -9,7 +9,7 @@ import numpy as np
 
 from opspace.controller import Controller
 from opspace.errors import InputError
-from opspace.fleet.check_fleet import check_dynamics, check_robot, check_task
+from opspace.fleet.check_fleet import check_dynamics, check_memory, check_robot, check_task
 from opspace.fleet.precision import dtype_name
 from opspace.fleet.program import FleetProgram
 from opspace.fleet.roster import Roster
@@ -124,6 +124,7 @@ class Fleet:
             self.M, self.bias = self._zeros((count, n, n)), self._zeros((count, n))
         self.status = wp.zeros(count, dtype=wp.int32, device=self.device)
         self.hard_solves = wp.zeros(count, dtype=wp.int32, device=self.device)
+        self._ended = wp.full(count, np.nan, dtype=wp.float64, device=self.device)
         self._time = wp.zeros(1, dtype=wp.float64, device=self.device)
         self._plan: Plan | None = None
         self._lay_out()
@@ -166,7 +167,8 @@ class Fleet:
             tau: (count, n) where to write the torques, N·m; None is ``self.tau``.
 
         Returns:
-            ``tau``, or ``self.tau``; always finite. A robot whose state or target is not finite gets
+            ``tau``, or ``self.tau``; always finite. A robot whose state or target is not finite, or
+            one of whose gains is negative, gets
             the braking torque that `Controller.step` gives with ``Status.FAULT``.
 
         Raises:
@@ -342,7 +344,9 @@ class Fleet:
         assert self._plan is not None
         given = (self.M, self.bias) if self.given else None
         arrays = list(self._arrays.values())
-        return FleetProgram(self._plan, arrays, self.dtype, self.device, kind, given=given)
+        return FleetProgram(
+            self._plan, arrays, self.dtype, self.device, kind, ended=self._ended, given=given
+        )
 
     def _lay_out(self) -> None:
         """Make the plan, the kernel and the arrays for the tasks and levels that there are."""
@@ -365,6 +369,8 @@ class Fleet:
         self._ramps = wp.array(roster.ramps(plan.variables), dtype=wp.float64, device=self.device)
         self._plan = plan
         self._program = self.program_for("cpu" if self.device.is_cpu else "cuda")
+        if not self.device.is_cpu:
+            check_memory(self.robot.name, self._program.memory)
 
     def _zeros(self, shape: tuple[int, ...]) -> Any:
         return warp().zeros(shape, dtype=self._real, device=self.device)

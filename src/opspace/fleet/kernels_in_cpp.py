@@ -12,7 +12,7 @@ import ast
 import inspect
 import math
 import textwrap
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from types import FunctionType, MappingProxyType, ModuleType
 from typing import Any, TypeAlias
 
@@ -26,7 +26,7 @@ OPERATORS: Mapping[type, str] = {
 }  # fmt: skip
 FUNCTIONS = {
     "sqrt": "wp::sqrt", "sin": "wp::sin", "cos": "wp::cos", "tanh": "wp::tanh", "cosh": "wp::cosh",
-    "atan2": "wp::atan2", "ceil": "wp::ceil", "pow": "wp::pow",
+    "atan2": "wp::atan2", "ceil": "wp::ceil", "pow": "power",
     "isfinite": "wp::isfinite", "isnan": "wp::isnan", "isinf": "wp::isinf",
 }  # fmt: skip
 """What `math` and powers are there."""
@@ -35,14 +35,18 @@ PRELUDE = """\
 static constexpr auto value = [](auto x) { return x; };
 static constexpr auto smaller = [](auto a, auto b) { return b < a ? b : a; };
 static constexpr auto larger = [](auto a, auto b) { return b > a ? b : a; };
+static constexpr auto power = [](auto a, auto b) {
+  return wp::pow(decltype(a * b)(a), decltype(a * b)(b));
+};
 """
-"""Smaller and larger answer as Python's do where a number is none."""
+"""Smaller and larger answer as Python's do where a number is none; a power has the digits of both."""
 
 
 def translate(
     root: Callable[..., Any],
     constants: Mapping[str, float],
     instead: Mapping[Callable[..., Any], Callable[..., Any]] = MappingProxyType({}),
+    exact: Collection[str] = (),
 ) -> tuple[str, str]:
     """Write a kernel and whatever it calls as C++ lambdas, each after those that it calls.
 
@@ -50,6 +54,7 @@ def translate(
         root: The kernel, as numba has it or as plain Python.
         constants: Numbers that replace constants of the modules, by name.
         instead: Kernels that are called instead of others.
+        exact: Modules whose own numbers have sixteen digits, as the arrays that they work in.
 
     Returns:
         The code, and the name of the kernel's lambda.
@@ -57,7 +62,7 @@ def translate(
     Raises:
         InputError: A statement that has no counterpart.
     """
-    found = _Program(constants, instead)
+    found = _Program(constants, instead, exact)
     name = found.require(root)
     return PRELUDE + "\n".join(found.code), name
 
@@ -69,8 +74,10 @@ class _Program:
         self,
         constants: Mapping[str, float],
         instead: Mapping[Callable[..., Any], Callable[..., Any]],
+        exact: Collection[str],
     ) -> None:
         self.constants = constants
+        self.exact = exact
         self._instead = instead
         self.code: list[str] = []
         self._names: dict[Any, str] = {}
@@ -99,6 +106,8 @@ class _Function(ast.NodeVisitor):
         self._program = program
         self._globals = function.__globals__
         self._name = name
+        exact = function.__globals__.get("__name__") in program.exact
+        self._real = "double" if exact else "real"
         tree = ast.parse(textwrap.dedent(inspect.getsource(function))).body[0]
         assert isinstance(tree, ast.FunctionDef)
         self._tree = tree
@@ -245,21 +254,21 @@ class _Function(ast.NodeVisitor):
         return method(node)
 
     def _say_Constant(self, node: ast.Constant) -> str:
-        return _number(node.value)
+        return _number(node.value, self._real)
 
     def _say_Name(self, node: ast.Name) -> str:
         if node.id in self._parameters or self._scopes.knows(node.id):
             return f"{node.id}_"
         if node.id in self._program.constants:
-            return _number(self._program.constants[node.id])
+            return _number(self._program.constants[node.id], self._real)
         found = self._globals.get(node.id)
         if not isinstance(found, int | float):
             raise self._refusal(node)
-        return _number(found)
+        return _number(found, self._real)
 
     def _say_Attribute(self, node: ast.Attribute) -> str:
         if isinstance(node.value, ast.Name) and self._globals.get(node.value.id) is math:
-            return _number(getattr(math, node.attr))
+            return _number(getattr(math, node.attr), self._real)
         return f"{self._say(node.value)}.{node.attr}_()"
 
     def _say_Subscript(self, node: ast.Subscript) -> str:
@@ -323,7 +332,7 @@ class _Function(ast.NodeVisitor):
             "max": "larger",
             "abs": "wp::abs",
             "int": "I",
-            "float": "real",
+            "float": self._real,
         }
         if name in built_in:
             return built_in[name]
@@ -339,10 +348,9 @@ class _Function(ast.NodeVisitor):
 
     # --- Types -----------------------------------------------------------------------------------
 
-    @staticmethod
-    def _literal(node: ast.expr) -> str:
+    def _literal(self, node: ast.expr) -> str:
         """Return the type of a variable that begins as a literal."""
-        kinds = {bool: "bool", int: "I", float: "real"}
+        kinds = {bool: "bool", int: "I", float: self._real}
         return kinds.get(type(node.value), "auto") if isinstance(node, ast.Constant) else "auto"
 
     def _type(self, node: ast.expr) -> str:
@@ -497,13 +505,13 @@ def _holds(statement: ast.stmt, node: ast.AST) -> bool:
     return any(one is node for one in ast.walk(statement))
 
 
-def _number(value: Any) -> str:
+def _number(value: Any, real: str) -> str:
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, int):
         return f"I({int(value)})"
     if isinstance(value, float):
         if math.isinf(value):
-            return "real(INFINITY)" if value > 0.0 else "(-real(INFINITY))"
-        return f"real({value!r})"
+            return f"{real}(INFINITY)" if value > 0.0 else f"(-{real}(INFINITY))"
+        return f"{real}({value!r})"
     raise InputError(f"{value!r} is no number")

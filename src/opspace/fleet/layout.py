@@ -28,18 +28,26 @@ BEGUN = ("kind", "numbers", "limit")
 """What the plan begins and a tick goes on with, each robot for itself."""
 EMPTY = (
     *("U", "motors", "M", "bias", "placement", "velocity", "acceleration", "force", "inertia"),
-    *("count", "rows", "remembered", "spring"),
+    *("count", "rows", "remembered", "spring", "kp", "kv"),
 )
-"""What a tick does not write everywhere and reads as zero there: a fleet stands on nothing."""
+"""What a tick does not write everywhere and reads as zero there: a fleet stands on nothing, and springs
+have no gains."""
 
-BLOCKS = "numbers, integers, fixed, whole"
+DIGITS = ("dynamics", "later", "bounds")
+"""Records that count with sixteen digits in every fleet. Inertias seen from the origin of the world lose
+three where wrists are light, and the multipliers of bounds that contradict each other seven."""
+
+PLACES = {"real": ("numbers", "fixed"), "double": ("exact", "fixed"), "I": ("integers", "whole")}
+"""Where arrays of a type are that a robot has for itself, and those that robots share."""
+
+BLOCKS = "numbers, exact, integers, fixed, whole"
 
 
 class RobotLayout:
-    """All arrays of a plan: what robots share, in two blocks, and what each works in, in two others.
+    """All arrays of a plan: what robots share, in two blocks, and what each works in, in three others.
 
-    A record in C++ is where the four blocks begin, and each of its arrays a place in one of them that
-    the compiler knows.
+    A record in C++ is where the blocks begin, and each of its arrays a place in one of them that the
+    compiler knows.
 
     Args:
         tick: The plan's arrays, as a new plan has them.
@@ -60,11 +68,22 @@ class RobotLayout:
         self._kinds: dict[tuple[str, tuple[int, ...]], str] = {}
         self._option = tick.option
         found = {id(a): (f, a) for r in self._records.values() for f, a in _arrays(r) if a.size}
-        self._blocks = [_Blocks(found.values(), dtype) for dtype in (np.float64, np.int64)]
+        exact = {
+            id(array): (field, array)
+            for name in DIGITS
+            for field, array in _arrays(getattr(tick, name))
+            if array.dtype == np.float64 and array.size and not _shared(field)
+        }
+        rest = [pair for key, pair in found.items() if key not in exact]
+        self._blocks = {
+            "real": _Blocks([pair for pair in rest if pair[1].dtype == np.float64], np.float64),
+            "double": _Blocks(exact.values(), np.float64),
+            "I": _Blocks([pair for pair in rest if pair[1].dtype == np.int64], np.int64),
+        }
         self._structs = [
             text for name, record in self._records.items() for text in self._struct(name, record)
         ]
-        self.numbers, self.integers = (blocks.shared for blocks in self._blocks)
+        self.numbers, self.integers = (self._blocks[kind].shared for kind in ("real", "I"))
 
     def types(self) -> str:
         """Return the types of all arrays and records."""
@@ -72,20 +91,22 @@ class RobotLayout:
 
     def memory_of(self, number: int) -> int:
         """Return how many bytes a robot has for itself if a number has so many."""
-        numbers, integers = self._blocks
-        return numbers.size * number + integers.size * 8
+        sizes = {"real": number, "double": 8, "I": 8}
+        return sum(blocks.size * sizes[kind] for kind, blocks in self._blocks.items())
 
     def definitions(self) -> str:
         """Return the definitions of all records, for one robot."""
-        numbers, integers = self._blocks
-        lines = [*numbers.begin("real", "numbers", "fixed", self._poison)]
-        lines += integers.begin("I", "integers", "whole", self._poison)
+        lines = [
+            line
+            for kind, blocks in self._blocks.items()
+            for line in blocks.begin(kind, *PLACES[kind], self._poison)
+        ]
         lines += [f"const Of_{name} {name}{{{BLOCKS}}};" for name in self._records]
         return "\n".join(lines)
 
     def _struct(self, name: str, record: Record) -> Iterator[str]:
         """Write the type of a record, after those of the records in it."""
-        parts = ["real* numbers; I* integers; const real* fixed; const I* whole;"]
+        parts = ["real* numbers; double* exact; I* integers; const real* fixed; const I* whole;"]
         for field, value in zip(record._table.fields, record, strict=True):
             if isinstance(value, Record):
                 yield from self._struct(f"{name}_{field.name}", value)
@@ -106,19 +127,23 @@ class RobotLayout:
     def _kind(self, name: str, array: np.ndarray) -> str:
         if name == "option":
             return "Options"
-        key = ("I" if array.dtype == np.int64 else "real"), array.shape
+        key = self._type(array), array.shape
         return self._kinds.setdefault(key, "_".join([key[0], *map(str, array.shape)]))
+
+    def _type(self, array: np.ndarray) -> str:
+        if id(array) in self._blocks["double"].own:
+            return "double"
+        return "I" if array.dtype == np.int64 else "real"
 
     def _place(self, array: np.ndarray) -> str:
         """Say where an array begins."""
-        whole = array.dtype == np.int64
-        kind = "I" if whole else "real"
+        kind = self._type(array)
         if not array.size:
             return f"({kind}*)0"
-        blocks = self._blocks[whole]
+        blocks, (own, shared) = self._blocks[kind], PLACES[kind]
         if id(array) in blocks.own:
-            return f"{'integers' if whole else 'numbers'} + {blocks.own[id(array)]}"
-        return f"({kind}*){'whole' if whole else 'fixed'} + {blocks.of_all[id(array)]}"
+            return f"{own} + {blocks.own[id(array)]}"
+        return f"({kind}*){shared} + {blocks.of_all[id(array)]}"
 
     def _frozen(self) -> dict[int, float]:
         return {i: float(self._option[i]) for i in FROZEN}
@@ -131,7 +156,7 @@ class _Blocks:
     """
 
     def __init__(self, arrays: Iterable[tuple[Field, np.ndarray]], dtype: type) -> None:
-        some = [(field, array) for field, array in arrays if array.dtype == dtype]
+        some = list(arrays)
         begun = [array for field, array in some if field.name in BEGUN]
         shared = [array for field, array in some if field.name not in BEGUN and _shared(field)]
         own = [(f, a) for f, a in some if f.name not in BEGUN and not _shared(f)]
@@ -152,7 +177,7 @@ class _Blocks:
         for k in self._turns:
             yield f"{name}[{k}] = {name}[{k + 4}] = {name}[{k + 8}] = 1;"
         if poison:
-            none = "I(123456789)" if kind == "I" else "real(NAN)"
+            none = "I(123456789)" if kind == "I" else f"{kind}(NAN)"
             yield f"for (int k = {self._known}; k < {self.size}; ++k) {name}[k] = {none};"
 
 

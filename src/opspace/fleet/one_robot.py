@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from opspace.command import Status
+from opspace.fleet.integral_sums import forget_sum, learn, push
 from opspace.kernels.columns import (
     FIRST_ROW,
     GOAL_ACCELERATION,
@@ -49,16 +50,33 @@ def robot_tick(work, robot):
                 _take_spring(work, robot, i)
         elif work.kind[i, KIND] == JOINTS:
             _take_joints(work, robot, i)
+    push(work, robot)
     answer = tick(0.0, work)
-    if answer < 0:
+    if answer < 0 or not _gains_usable(work, robot):
         brake(work, work.tau)
         robot.status[0], robot.solves[0] = FAULT, 0
     else:
         robot.status[0], robot.solves[0] = answer % SOLVE, answer // SOLVE
+    learn(work, robot, robot.status[0])
     for i in range(work.kind.shape[0]):
         robot.remembers[i] = work.kind[i, REMEMBERS]
         for c in range(4):
             robot.turn[i, c] = work.numbers[i, TURN + c]
+
+
+def _gains_usable(work, robot):
+    """Whether no gain is negative or none; they are in arrays that anybody writes."""
+    for i in range(work.kind.shape[0]):
+        first, rows = work.kind[i, FIRST_ROW], work.kind[i, ROWS]
+        spring = work.kind[i, KIND] == MOTION and work.kind[i, SPRING] != 0
+        if spring and not robot.damping_ratio[i] >= 0.0:
+            return False
+        for row in range(first, first + rows):
+            if spring and not robot.stiffness[row] >= 0.0:
+                return False
+            if not spring and not (work.kp[row] >= 0.0 and work.kv[row] >= 0.0):
+                return False
+    return True
 
 
 def _begin(work, robot):
@@ -67,6 +85,7 @@ def _begin(work, robot):
         robot.found[i] = 0
         if robot.epoch[i] != robot.seen[i]:
             robot.remembers[i] = 0
+            forget_sum(work, robot, i)
             robot.found[i] = robot.holds[i]
             robot.seen[i] = robot.epoch[i]
         work.kind[i, REMEMBERS] = robot.remembers[i]

@@ -8,8 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from opspace.fleet.exact_limits import EXACTLY, rests_of
 from opspace.fleet.fleet_kernel import fleet_kernel
 from opspace.fleet.given_motion import INSTEAD
+from opspace.fleet.integral_sums import WITHOUT
 from opspace.fleet.kernels_in_cpp import translate
 from opspace.fleet.layout import RobotLayout
 from opspace.fleet.one_robot import robot_tick
@@ -27,6 +29,9 @@ LOOP = re.compile(r"^( *)(for \(I )", re.M)
 LAMBDA = re.compile(r"^(static constexpr auto \w+ = \[\]\([^)]*\)) \{$", re.M)
 ROLLED = {"cpu": '_Pragma("clang loop unroll(disable)")', "cuda": '_Pragma("unroll 1")'}
 """Loops stay loops: rolled out they take a compiler many times as long."""
+
+EXACT = tuple(f"opspace.kernels.{name}" for name in ("dynamics", "projection", "room_below"))
+"""Modules that count with sixteen digits in every fleet, as `opspace.fleet.layout.DIGITS` do."""
 
 OPTIONS = {
     "cpu": (("optimization_level", 1), ("cpu_compiler_flags", "-march=native")),
@@ -46,6 +51,7 @@ class FleetProgram:
         device: Where the arrays are.
         kind: What the kernel is for, ``"cpu"`` or ``"cuda"``.
         given: Inertia and bias of every robot if dynamics are given, M and bias.
+        ended: (count,) of float64, when the last tick of every robot was, s.
         poison: Begin all memory as numbers that are none, so that whatever is read before it is
             written shows.
 
@@ -64,6 +70,7 @@ class FleetProgram:
         device: Any,
         kind: str,
         *,
+        ended: Any,
         given: tuple[Any, Any] | None = None,
         poison: bool = False,
     ) -> None:
@@ -75,7 +82,18 @@ class FleetProgram:
         self._addresses: list[int] = []
         self._first = layout.integers.size
         lines = _lines(plan, arrays, given, self._address)
-        code, name = _translated(dtype, given is not None)
+        integrates = any(task.integrates for task in arrays)
+        if integrates:
+            timing = _time_lines(arrays, self._address(ended))
+            lines = lines[0] + timing[0], lines[1] + timing[1]
+        numbers = layout.numbers
+        if dtype == "float32":
+            lines[0].append(
+                f"for (int k = 0; k < {sizes['limits']}; ++k) "
+                f"robot.limit_rest_().p[k] = fixed[{numbers.size} + k];"
+            )
+            numbers = np.concatenate([numbers, rests_of(plan.tick.limit)])
+        code, name = _translated(dtype, given is not None, integrates)
         text = "\n".join(
             [
                 f"typedef {'double' if dtype == 'float64' else 'float'} real;",
@@ -92,7 +110,7 @@ class FleetProgram:
         )
         self.kernel = fleet_kernel(_for_compiler(text, kind), dtype, OPTIONS[kind])
         self.memory = layout.memory_of(np.dtype(dtype).itemsize)
-        self.fixed = wp.array(layout.numbers, dtype=real, device=device)
+        self.fixed = wp.array(numbers, dtype=real, device=device)
         whole = np.concatenate([layout.integers, np.array(self._addresses, np.int64)])
         self.whole = wp.array(whole, dtype=wp.int64, device=device)
 
@@ -147,6 +165,15 @@ def _lines(
     return before, after
 
 
+def _time_lines(arrays: list[TaskArrays], ended: str) -> tuple[list[str], list[str]]:
+    """Write what integrals need: how long it is since the tick before, and which tasks have none."""
+    last = f"((double*){ended})[i]"
+    now = "(times.shape[0] > 1 ? times.data[i] : times.data[0])"
+    before = [f"robot.since_()(0) = real({now} - {last});"]
+    before += [f"robot.ki_()({i}) = 0;" for i, task in enumerate(arrays) if not task.integrates]
+    return before, [f"{last} = {now};"]
+
+
 def _for_compiler(text: str, kind: str) -> str:
     """Say what a compiler shall leave as it is."""
     text = LOOP.sub(rf"\1{ROLLED[kind]} \2", text)
@@ -160,5 +187,8 @@ def _row(array: str) -> str:
 
 
 @cache
-def _translated(dtype: str, given: bool) -> tuple[str, str]:
-    return translate(robot_tick, constants_of(dtype), INSTEAD if given else {})
+def _translated(dtype: str, given: bool, integrates: bool) -> tuple[str, str]:
+    instead = {**(INSTEAD if given else {}), **({} if integrates else WITHOUT)}
+    if dtype == "float32":
+        instead |= EXACTLY
+    return translate(robot_tick, constants_of(dtype), instead, EXACT)

@@ -28,6 +28,15 @@ ROBOT = RecordTable(
     _given("joint_target", ("rows",), "target of tasks of joints", "rad, m"),
     _given("joint_velocity", ("rows",), "its rate", "rad/s, m/s"),
     _given("joint_acceleration", ("rows",), "the rate of that", "rad/s², m/s²"),
+    _given(
+        "limit_rest", ("limits",), "what seven digits leave of the positions of limits", "m, rad"
+    ),
+    _given("ki", ("tasks",), "integral gain, 0 for none", "1/s³"),
+    _given("max_integral", ("tasks",), "error whose pull the integral adds at most", "m, rad"),
+    _given("integral", ("tasks", 6), "what it adds to tasks of motion", "m/s², rad/s²"),
+    _given("joint_integral", ("rows",), "what it adds to tasks of joints", "rad/s², m/s²"),
+    _given("learned", ("rows",), "errors that it adds up in this tick", "m, rad"),
+    _given("since", (1,), "time since the tick before", "s"),
     _whole("epoch", ("tasks",), "how often the task has begun, as its owner counts"),
     _whole("seen", ("tasks",), "the same, as far as the robot has noticed"),
     _whole("holds", ("tasks",), "whether the task holds what it finds when it begins"),

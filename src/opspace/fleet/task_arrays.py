@@ -49,6 +49,10 @@ class TaskArrays:
         activation: A factor of the task's presence in the stack, 0 to 1.
         error: (m,) x_d − x at the last step, m, rad.
         presence: h at the last step, activation included.
+        integrates: Whether it has the three that follow: a task with a ``ki``.
+        ki: Integral gain, 1/s³; below kp kv, or it diverges.
+        max_integral: Error whose pull, kp times it, the integral adds at most, m, rad.
+        integral: What it adds to the acceleration, as ``acceleration`` has it.
         is_spring: Whether it has the three that follow: an `ImpedanceTask`.
         stiffness: (m,) K, N/m, N·m/rad.
         damping_ratio: ζ, 1 is critical.
@@ -67,7 +71,7 @@ class TaskArrays:
         self._size = 0
         self._joints = False
         self.told_motion = False
-        self.is_spring = False
+        self.is_spring = self.integrates = False
         self._start = 0
         self._wishes = np.full(count, task.target is None)
 
@@ -114,6 +118,11 @@ class TaskArrays:
             self._filled, (target, velocity, acceleration)
         )
         self.kp, self.kv = self._filled(tick.kp[rows]), self._filled(tick.kv[rows])
+        if self.task.ki is not None:
+            self.integrates = True
+            self.ki = self._filled(np.array(self.task.ki))
+            self.max_integral = self._filled(np.array(self.task._max_integral))
+            self.integral = self._filled(np.zeros(self.acceleration.shape[1]))
         one = np.ones(())
         self.activation, self.presence = self._filled(one), self._filled(one)
         self.error = self._filled(np.zeros(m))
@@ -197,6 +206,11 @@ class TaskArrays:
         for name in ("pose", "jacobian", "drift") if self.told_motion else ():
             array = getattr(self, name)
             yield "in", array, f"(robot.{name}_().p + {i * int(np.prod(array.shape[1:]))})"
+        if self.integrates:
+            place = f"joint_integral_().p + {first}" if self._joints else f"integral_().p + {6 * i}"
+            yield "in", self.ki, f"(robot.ki_().p + {i})"
+            yield "in", self.max_integral, f"(robot.max_integral_().p + {i})"
+            yield "in, out", self.integral, f"(robot.{place})"
         if self.is_spring:
             yield "in", self.stiffness, f"(robot.stiffness_().p + {first})"
             yield "in", self.force, f"(robot.spring_force_().p + {first})"

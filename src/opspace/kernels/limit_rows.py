@@ -56,24 +56,30 @@ def begin_limits(work):
     """Evaluate what every limit asks for or allows, rad/s², into its row of ``limit`` (limits, 11)."""
     for i in range(work.limit.shape[0]):
         limit = work.limit[i]
-        j = work.limit_joint[i]
-        limit[COMMAND] = _command(work, limit, j, limit[SPEED])
-        limit[BY_POSITION] = _command(work, limit, j, math.inf) - limit[DISTURBANCE]
+        limit[COMMAND] = _command(work, i, limit[SPEED])
+        limit[BY_POSITION] = _command(work, i, math.inf) - limit[DISTURBANCE]
         limit[HASTE], limit[LAST], limit[SHIFT] = 0.0, math.inf, 0.0
         if work.option[LIMIT_BOUND] != 0.0:
-            stop(work, limit, j)
+            stop(work, i)
         limit[COMMAND] -= limit[DISTURBANCE]
         limit[LAST] -= limit[DISTURBANCE]
 
 
 @jit
-def _command(work, limit, j, speed):
-    """What a limit of joint j asks for or allows, of a joint that may be so fast."""
-    option = work.option
+def distance_to_limit(work, i):
+    """How far the joint of limit i is from it, rad or m; below zero past it."""
+    limit = work.limit[i]
+    return limit[SIGN] * (limit[POSITION] - joint_position(work, work.limit_joint[i]))
+
+
+@jit
+def _command(work, i, speed):
+    """What limit i asks for or allows, of a joint that may be so fast."""
+    option, limit = work.option, work.limit[i]
     return limit_command(
         int(option[LIMIT_LAW]),
-        limit[SIGN] * (limit[POSITION] - joint_position(work, j)),
-        limit[SIGN] * work.v[j],
+        distance_to_limit(work, i),
+        limit[SIGN] * work.v[work.limit_joint[i]],
         limit[BRAKE],
         speed,
         option[LIMIT_K1],
@@ -84,10 +90,11 @@ def _command(work, limit, j, speed):
 
 
 @jit
-def stop(work, limit, j):
+def stop(work, i):
     """Ask more of a joint that is too fast, as much as its motors give while they hold the others."""
     k1, period = work.option[LIMIT_K1], work.option[PERIOD]
-    d, towards = limit[SIGN] * (limit[POSITION] - joint_position(work, j)), limit[SIGN] * work.v[j]
+    limit, j = work.limit[i], work.limit_joint[i]
+    d, towards = distance_to_limit(work, i), limit[SIGN] * work.v[j]
     if towards <= 0.0:
         return
     if stopping_command(d, towards, limit[BRAKE], math.inf, k1, period) == math.inf:
@@ -115,11 +122,10 @@ def insert_limits(work):
     option = work.option
     for i in range(work.limit.shape[0]):
         limit = work.limit[i]
-        j = work.limit_joint[i]
         work.limit_h[i] = limit_presence(
             int(option[LIMIT_LAW]),
-            limit[SIGN] * (limit[POSITION] - joint_position(work, j)),
-            limit[SIGN] * work.v[j],
+            distance_to_limit(work, i),
+            limit[SIGN] * work.v[work.limit_joint[i]],
             limit[BRAKE],
             option[LIMIT_BUFFER],
             int(option[LIMIT_PROFILE]),

@@ -211,7 +211,11 @@ def _most_broken(count, n, bounds):
 
 @jit
 def multipliers(n, known, size, way, bounds):
-    """Solve (N wayᵀ + softness) λ = N x − bound for the bounds that hold, some of which are factored."""
+    """Solve (N wayᵀ + softness) λ = N x − bound for the bounds that hold, some of which are factored.
+
+    What a bound adds to those before it, the pivot, is its softness at least: N wayᵀ has no negative
+    eigenvalues. Less than that is rounding, where its normal is a combination of theirs.
+    """
     for k in range(size):
         i = bounds.active[k]
         bounds.r[k] = -bounds.bound[i]
@@ -226,7 +230,10 @@ def multipliers(n, known, size, way, bounds):
                 product += bounds.normal[i, a] * way[j, a]
             bounds.G[k, b] = product
         bounds.G[k, k] += bounds.softness[i]
-        cholesky_row(bounds.G, k, 0.0, bounds.factor)
+        largest = 1.0 / math.sqrt(bounds.softness[i])
+        positive = cholesky_row(bounds.G, k, 0.0, bounds.factor)
+        if not positive or bounds.factor[k, k] > largest:
+            bounds.factor[k, k] = largest
     solve_lower(bounds.factor, size, bounds.r)
     solve_lower_transposed(bounds.factor, size, bounds.r)
     for k in range(size):

@@ -1,0 +1,230 @@
+"""Integral action of one robot of a fleet, as `opspace.controller.integral`, in kernels' language."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from opspace.command import Status
+from opspace.controller.disturbance import LONGEST
+from opspace.kernels.algebra import singular_values
+from opspace.kernels.columns import (
+    FIRST_ROW,
+    GOAL_ACCELERATION,
+    JOINTS,
+    KIND,
+    MAX_SPEED,
+    MOTION,
+    POSE,
+    QUANTITY,
+    RELEASE_UPPER,
+    ROWS,
+    SIGMA_LOWER,
+    SIGMA_PROFILE,
+    SINGULAR,
+    SPEED_LIMITED,
+    TOOL_AXES,
+    slot_bit,
+)
+from opspace.kernels.compiled_scalars import profile
+from opspace.kernels.motion import measure, selected
+
+LEARNS = int(Status.OK | Status.DIRECTION_OFF | Status.LATE)
+"""With anything else in its status a robot has not done what was asked, which teaches nothing."""
+DIRECTION_OFF = int(Status.DIRECTION_OFF)
+
+
+def forget_sum(work, robot, i):
+    """Begin anew with task i."""
+    for c in range(6):
+        robot.integral[i, c] = 0.0
+    for row in range(work.kind[i, FIRST_ROW], work.kind[i, FIRST_ROW] + work.kind[i, ROWS]):
+        robot.joint_integral[row] = 0.0
+
+
+def push(work, robot):
+    """Add the integrals to what tasks are told to accelerate."""
+    for i in range(work.kind.shape[0]):
+        if robot.ki[i] == 0.0:
+            continue
+        first, rows = work.kind[i, FIRST_ROW], work.kind[i, ROWS]
+        if work.kind[i, KIND] == MOTION:
+            for c in range(6):
+                work.numbers[i, GOAL_ACCELERATION + c] += robot.integral[i, c]
+        elif work.kind[i, KIND] == JOINTS:
+            for row in range(first, first + rows):
+                work.goal[row, 2] += robot.joint_integral[row]
+
+
+def learn(work, robot, status):
+    """Add the errors of a tick, as far as the robot could do something about them.
+
+    Args:
+        work: `opspace.plan.records.TICK` after a tick.
+        robot: `opspace.fleet.robot_record.ROBOT`.
+        status: What happened, in the numbers of `opspace.Status`.
+    """
+    if not 0.0 < robot.since[0] <= LONGEST or status | LEARNS != LEARNS:
+        return
+    for i in range(work.kind.shape[0]):
+        if robot.ki[i] == 0.0 or work.h[i] < 1.0 or _asks_too_much(work, i):
+            continue
+        s = _only_place(work, i)
+        if s < 0 or not _choose(work, robot, i, s, status):
+            continue
+        if work.kind[i, KIND] == JOINTS:
+            _add_joints(work, robot, i)
+        else:
+            if work.kind[i, TOOL_AXES] != 0:
+                measure(work, i)
+            _add_motion(work, robot, i)
+
+
+def _asks_too_much(work, i):
+    """Whether an error asks for more than its speed, as in `opspace.kernels.task_rows`."""
+    if work.kind[i, SPEED_LIMITED] == 0:
+        return False
+    first, rows = work.kind[i, FIRST_ROW], work.kind[i, ROWS]
+    group = rows
+    if work.kind[i, KIND] == MOTION and work.kind[i, QUANTITY] == POSE:
+        group = 3
+    for start in range(first, first + rows, max(group, 1)):
+        total = 0.0
+        for row in range(start, start + group):
+            if work.kp[row] > 0.0:
+                asked = work.kp[row] / work.kv[row] * work.error[row]
+                total += asked * asked
+        limit = work.numbers[i, MAX_SPEED + (start - first) // group]
+        if total > limit * limit:
+            return True
+    return False
+
+
+def _only_place(work, i):
+    """Slot of the only level where task i is, −1 for none or several."""
+    found = -1
+    for s in range(work.slots.shape[0]):
+        if work.slots[s, 1] != work.kind[i, FIRST_ROW] or not work.share[s] > 0.0:
+            continue
+        if found >= 0 and work.slots[found, 0] != work.slots[s, 0]:
+            return -1
+        if found < 0:
+            found = s
+    return found
+
+
+def _choose(work, robot, i, s, status):
+    """Take the errors of task i, in the directions that are on.
+
+    Returns:
+        Whether anything of its level is solved.
+    """
+    space, depth = work.space, work.slots[s, 0]
+    first, rows = work.kind[i, FIRST_ROW], work.kind[i, ROWS]
+    highest = depth
+    for k in range(work.slots.shape[0]):
+        if work.share[k] > 0.0:
+            highest = min(highest, work.slots[k, 0])
+    count, before = 0, -1
+    for k in range(work.slots.shape[0]):
+        if work.slots[k, 0] == depth and space.chosen[depth] & slot_bit(k) != 0:
+            if work.slots[k, 1] == first and before < 0:
+                before = count
+            count += work.slots[k, 2]
+    solved = space.top[depth] > 0.0
+    if status & DIRECTION_OFF == 0 and depth == highest and (before >= 0 or not solved):
+        for row in range(first, first + rows):
+            robot.learned[row] = work.error[row]
+        return True
+    if before < 0 or not solved or space.width[depth] == 0:
+        return False
+    _project(work, robot, i, depth, count, before)
+    return True
+
+
+def _project(work, robot, i, depth, m, before):
+    """Take what directions that are on have of the errors of task i.
+
+    Args:
+        work: `opspace.plan.records.TICK`.
+        robot: `opspace.fleet.robot_record.ROBOT`.
+        i: Number of the task.
+        depth: Its level.
+        m: Rows of the level.
+        before: Where among them those of the task begin.
+    """
+    space, option = work.space, work.option
+    B, C, Y, sigma = space.kept, space.C, space.Y, space.sigma
+    start, free = space.first_kept[depth], space.width[depth]
+    wide = m <= free
+    for a in range(m):
+        for b in range(free):
+            if wide:
+                C[a, b] = B[start + a, b]
+            else:
+                C[b, a] = B[start + a, b]
+    k = min(m, free)
+    singular_values(C, k, max(m, free), Y, sigma)
+    first, rows = work.kind[i, FIRST_ROW], work.kind[i, ROWS]
+    for r in range(rows):
+        robot.learned[first + r] = 0.0
+    for j in range(k):
+        if sigma[j] == 0.0:
+            continue
+        if option[SINGULAR] != 0.0:
+            above = sigma[j] * sigma[j] - option[SIGMA_LOWER]
+            width = option[RELEASE_UPPER] - option[SIGMA_LOWER]
+            if profile(int(option[SIGMA_PROFILE]), above / width) < 1.0 - 1e-9:
+                continue
+        along = 0.0
+        for r in range(rows):
+            entry = Y[j, before + r] if wide else C[j, before + r] / sigma[j]
+            along += entry * work.row_weight[first + r] * work.error[first + r]
+        for r in range(rows):
+            entry = Y[j, before + r] if wide else C[j, before + r] / sigma[j]
+            robot.learned[first + r] += entry * along / work.row_weight[first + r]
+
+
+def _add_joints(work, robot, i):
+    """Add to the integrals of a task of joints: z ← clip(z + k_i Δt e, ± k_p e_max)."""
+    first, rows = work.kind[i, FIRST_ROW], work.kind[i, ROWS]
+    gain = robot.ki[i] * robot.since[0]
+    for row in range(first, first + rows):
+        most = robot.max_integral[i] * work.kp[row]
+        moved = robot.joint_integral[row] + gain * robot.learned[row]
+        robot.joint_integral[row] = min(max(moved, -most), most)
+
+
+def _add_motion(work, robot, i):
+    """Add to those of a task of motion, in the coordinates of that."""
+    first, rows = work.kind[i, FIRST_ROW], work.kind[i, ROWS]
+    gain, size = robot.ki[i] * robot.since[0], 3
+    if work.kind[i, QUANTITY] == POSE:
+        size = 6
+    for c in range(size):
+        moved, most = robot.integral[i, c], 0.0
+        for row in range(first, first + rows):
+            factor = selected(work, i, row, c)
+            moved += gain * factor * robot.learned[row]
+            most += abs(factor) * robot.max_integral[i] * work.kp[row]
+        robot.integral[i, c] = min(max(moved, -most), most)
+
+
+def forget_nothing(work, robot, i):
+    """Have no integral."""
+
+
+def push_nothing(work, robot):
+    """Have no integral."""
+
+
+def learn_nothing(work, robot, status):
+    """Have no integral."""
+
+
+WITHOUT: Mapping[Callable[..., Any], Callable[..., Any]] = {
+    forget_sum: forget_nothing,
+    push: push_nothing,
+    learn: learn_nothing,
+}
+"""What is called where no task has a ki, by what is called otherwise."""
