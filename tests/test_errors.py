@@ -2,6 +2,7 @@
 
 import copy
 import pickle
+from typing import Any
 
 import pytest
 
@@ -17,6 +18,14 @@ IN_A_FILE = osc.ScenarioError("is missing", file="my.yaml", line=3, key="tasks.p
 def test_an_unknown_name_carries_the_name_and_every_choice():
     assert (NOT_FOUND.name, NOT_FOUND.kind) == ("tol", "frame")
     assert NOT_FOUND.choices == ("tool", "base")
+
+
+def test_a_number_is_no_name():
+    number: Any = 2
+    robot = osc.load_robot("puma560")
+    for task, kind in ((osc.PositionTask(number), "frame"), (osc.JointTask(number), "joint")):
+        with pytest.raises(osc.UnknownNameError, match=rf"unknown {kind}.* 2 \(valid: "):
+            task.bind(robot)
 
 
 def test_choices_are_kept_where_the_context_is_told():

@@ -109,7 +109,7 @@ def unknown_name(
         The error, to be raised by the caller.
     """
     valid = list(choices)
-    near = difflib.get_close_matches(name, valid, n=3, cutoff=0.5)
+    near = difflib.get_close_matches(str(name), valid, n=3, cutoff=0.5)
     hint = f"; did you mean {' or '.join(repr(n) for n in near)}?" if near else ""
     shown = valid if listed is None else list(listed)
     return UnknownNameError(
