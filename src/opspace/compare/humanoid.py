@@ -96,6 +96,11 @@ VARIANTS: Mapping[str, Variant] = MappingProxyType(
             {},
             partial(ReferenceController, law=ten_to_one),
         ),
+        "weighted-switch": Variant(
+            "the same program, weights that switch",
+            {"method": "switch"},
+            partial(ReferenceController, law=ten_to_one),
+        ),
     }
 )
 

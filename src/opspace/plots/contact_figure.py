@@ -18,11 +18,13 @@ COLORS: Mapping[str, str] = {
     "transition": style.VARIANT_COLORS["transition"],
     "switch": style.VARIANT_COLORS["switch"],
     "weighted": style.VARIANT_COLORS["without"],
+    "weighted-switch": style.line_color(3),
 }
 TITLES: Mapping[str, str] = {
     "transition": "continuous",
     "switch": "hard switch",
     "weighted": "weighted QP",
+    "weighted-switch": "switched weights",
 }
 LOWEST = 1e-4
 """Where a torque step counts as none, N·m."""
