@@ -253,7 +253,7 @@ EASE = 1.5
 SOON = 0.02
 """A distance is lost that would be closing faster than it may within this time, s."""
 
-TICK_ROOM = 2e-5
+TICK_ROOM = 1e-4
 """By how much more than the margin distances are kept, for what a tick of a millisecond adds, m."""
 
 ROUNDED = 0.3
