@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from opspace.kernels.quiet_columns import LAST, LONGEST, LOOK_FIRST, NEXT, NOW, SHORTEST
-from opspace.kernels.tick import tick
+from opspace.kernels.tick import finite, tick
 from opspace.machine.jit import jit
 
 
@@ -27,7 +27,7 @@ def quiet_tick(t, q, v, quiet, work):
     """
     if q.shape[0] != work.q.shape[0] or v.shape[0] != work.v.shape[0]:
         return LOOK_FIRST
-    if not math.isfinite(t) or not _finite(q) or not _finite(v) or not t < quiet.times[NEXT]:
+    if not math.isfinite(t) or not finite(q) or not finite(v) or not t < quiet.times[NEXT]:
         return LOOK_FIRST
     if quiet.watch.shape[0] > 0 and not _in_time_and_new(t, q, v, quiet):
         return LOOK_FIRST
@@ -41,14 +41,6 @@ def quiet_tick(t, q, v, quiet, work):
         _copy(q, quiet.last_q)
         _copy(v, quiet.last_v)
     return answer
-
-
-@jit
-def _finite(x):
-    for i in range(x.shape[0]):
-        if not math.isfinite(x[i]):
-            return False
-    return True
 
 
 @jit

@@ -73,7 +73,7 @@ def tick(t, work):
         One of the answers in `opspace.kernels.columns`, negative; or what happened in the numbers
         of `opspace.Status` plus ``SOLVE`` times the number of hard torques.
     """
-    if not _finite(work.q) or not _finite(work.v):
+    if not finite(work.q) or not finite(work.v):
         return STATE_NOT_FINITE
     if work.bodies.kind.shape[0] > 0:
         evaluate(work.bodies, work.q, work.v, work.dynamics)
@@ -98,7 +98,7 @@ def tick(t, work):
     else:
         torque(work)
         kept = keep_bounds(work, stacks)
-    if not _finite(work.tau):
+    if not finite(work.tau):
         return NOT_FINITE
     bits = status(work) | kept | stale(work)
     freeze(work, bits)
@@ -108,7 +108,8 @@ def tick(t, work):
 
 
 @jit
-def _finite(x):
+def finite(x):
+    """Whether every one of numbers (n,) is finite."""
     for i in range(x.shape[0]):
         if not math.isfinite(x[i]):
             return False
