@@ -84,6 +84,14 @@ def test_a_scenario_that_uses_everything_is_built_and_steps():
     assert built.stop.max_torque == 500
 
 
+def test_a_tick_is_simulated_in_as_many_steps_as_the_scenario_says():
+    plant = build(short("plant={substeps: 20}")).plant
+    assert plant.dt == 0.001
+    assert plant.model.opt.timestep == pytest.approx(0.001 / 20)
+    with pytest.raises(ScenarioError, match=r"plant.*at least one step.*not 0"):
+        build(short("plant={substeps: 0}"))
+
+
 def test_levels_stand_in_the_order_of_their_numbers():
     tasks = {
         "low": {"type": "posture", "level": 7},

@@ -145,7 +145,7 @@ def _plant(
                 seed=scenario.seed,
             ),
             ground=build_ground(scenario, contacts),
-            substeps=SUBSTEPS if contacts else None,
+            substeps=SUBSTEPS if contacts and option.substeps is None else option.substeps,
         )
     except (InputError, UnknownNameError) as error:
         raise scenario.error(("plant",), str(error)) from error

@@ -152,6 +152,10 @@ class PlantEntry(Entry):
     torque_limits: bool = Field(
         default=True, description="saturate the torque at the robot's limits"
     )
+    substeps: Annotated[int, Checked(whole)] | None = Field(
+        default=None,
+        description="steps of the simulation in each tick; null is 1, and more where something touches",
+    )
 
 
 class FallingEntry(Entry):

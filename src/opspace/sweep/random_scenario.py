@@ -21,6 +21,8 @@ OBSERVER_TIME = 0.002
 """How fast joint limits learn what the model does not explain, s."""
 OUTSIDE = 0.15
 """How far outside its limits a joint may start, rad or m."""
+SUBSTEPS = 20
+"""Steps of the simulation in each tick: limits are to hold for an arm that moves between ticks."""
 AMONG_OBSTACLES = 1.0 / 3.0
 """Part of the scenarios that have obstacles."""
 
@@ -171,7 +173,10 @@ def _events(
 
 
 def _plant(rng: np.random.Generator, robot: Robot, duration: float) -> dict[str, Any]:
-    plant: dict[str, Any] = {"mass_error": round(float(rng.uniform(0.0, 0.2)), 4)}
+    plant: dict[str, Any] = {
+        "substeps": SUBSTEPS,
+        "mass_error": round(float(rng.uniform(0.0, 0.2)), 4),
+    }
     if np.all(np.isfinite(robot.torque_limit)) and rng.random() < 0.5:
         plant["dry_friction"] = round(float(rng.uniform(0.0, 0.03)), 4)
     if rng.random() < 0.5:
