@@ -1,5 +1,8 @@
 """Levels below leave those above what is left of a joint's limit, and take nothing from them."""
 
+import itertools
+import math
+
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
@@ -28,7 +31,8 @@ def problem(seed):
 
 def stacks_of(whitened, corners, damped=True):
     levels = [Level(i, frozenset([i])) for i in range(len(whitened))]
-    return Stacks(whitened, levels, [Weighted(w, frozenset(k)) for w, k in corners], damped)
+    blend = [Weighted(w, frozenset(k)) for w, k in corners]
+    return Stacks(whitened, levels, blend, [f"task {i}" for i in range(len(whitened))], damped)
 
 
 @given(seed=SEEDS)
@@ -114,3 +118,70 @@ def test_rows_of_any_length_are_left_alone_in_the_digits_there_are(seed):
     change = L.T @ (found[0].acceleration - found[1].acceleration)
     assert np.linalg.norm(change) < 1e-6 * size
     np.testing.assert_allclose(found[0].upper, found[1].upper, rtol=1e-5, atol=1e-6 * size)
+
+
+def moving(rng, n, shares, before, after):
+    """Tasks that are there in part, the last of them on its way from one level to another."""
+    whitened = [WhitenedTask(rng.normal(size=(2, n)), np.zeros(2)) for _ in shares[:-1]]
+    whitened += [WhitenedTask(rng.normal(size=(1, n)), np.zeros(1))] * 2
+    levels = [set() for _ in range(3)]
+    for k in range(len(shares) - 1):
+        levels[k % 3].add(k)
+    levels[before].add(len(shares) - 1)
+    levels[after].add(len(shares))
+    blend = []
+    for on in itertools.product((0, 1), repeat=len(shares)):
+        weight = math.prod(h if here else 1.0 - h for h, here in zip(shares, on, strict=True))
+        members = {k for k, here in enumerate(on[:-1]) if here} | {len(shares) - 1 + on[-1]}
+        blend += [Weighted(weight, frozenset(members))] if weight > 0.0 else []
+    names = [f"task {k}" for k in range(len(shares))] + [f"task {len(shares) - 1}"]
+    return Stacks(
+        whitened, [Level(i, frozenset(m)) for i, m in enumerate(levels)], blend, names, True
+    )
+
+
+@given(seed=SEEDS, weighed=st.booleans(), first=st.integers(1, 3))
+def test_what_is_left_moves_no_faster_than_activations(seed, weighed, first):
+    """Also where rows of one task are nearly those of another, and where activations cross."""
+    n, rng = 6, np.random.default_rng(seed)
+    shares = rng.random(5)
+    shares[1] = shares[0]
+    steps = 1e-7 * rng.normal(size=5)
+    other = np.clip(shares + steps, 0.0, 1.0)
+    before, after = rng.choice(3, 2, replace=False)
+    left = []
+    for now in (shares, other):
+        stacks = moving(np.random.default_rng(seed), n, now, before, after)
+        stacks.whitened[1].J[0] = stacks.whitened[0].J[0] + 1e-4 * stacks.whitened[1].J[0]
+        left.append(motions_left(stacks, first, n, weighed=weighed))
+    most = np.sum(np.abs(other - shares))
+    # A level more below counts ten times, and a task may be on its way over two levels.
+    slope = 2.0 + (3.0 * math.log(10.0) if weighed else 0.0)
+    assert np.linalg.norm(left[1] - left[0], 2) <= slope * most + 1e-14
+
+
+@given(seed=SEEDS, weighed=st.booleans(), first=st.integers(1, 3))
+def test_activations_of_0_and_1_leave_what_the_stack_leaves(seed, weighed, first):
+    n, rng = 6, np.random.default_rng(seed)
+    shares = rng.integers(0, 2, 5).astype(float)
+    before, after = rng.choice(3, 2, replace=False)
+    stacks = moving(rng, n, shares, before, after)
+    ((_, present),) = stacks.corners
+    counted, below = np.eye(n), 0
+    for place, level in reversed(list(enumerate(stacks.levels))):
+        here = level.members & present
+        weight = UNSEEN if place < first else level_weight(below) if weighed else 0.0
+        counted += weight * sum(stacks.whitened[k].J.T @ stacks.whitened[k].J for k in here)
+        below += bool(here)
+    found = motions_left(stacks, first, n, weighed=weighed)
+    np.testing.assert_allclose(found, np.linalg.inv(counted), atol=1e-9)
+
+
+@given(seed=SEEDS, share=st.floats(0.0, 1.0))
+def test_a_task_that_changes_places_is_never_unseen(seed, share):
+    """On its way between two levels it is at one of them, whatever else is on its way."""
+    rng = np.random.default_rng(seed)
+    stacks = moving(rng, 6, [*rng.random(4), share], 0, 1)
+    left = motions_left(stacks, 2, 6, weighed=False)
+    row = stacks.whitened[-1].J[0]
+    assert row @ left @ row <= 1.0 / UNSEEN + 1e-12

@@ -210,11 +210,7 @@ def realise(bounds: Bounds, tau: np.ndarray, stacks: Callable[[], Stacks]) -> Ke
 
 def metric_of(stacks: Stacks, n: int) -> np.ndarray:
     """Return W of `opspace.law.task_metric` for what is mixed, (n, n)."""
-    shares = [0.0] * len(stacks.whitened)
-    for weight, present in stacks.corners:
-        for i in present:
-            shares[i] += weight
-    return task_metric(stacks.whitened, stacks.levels, shares, n)
+    return task_metric(stacks.whitened, stacks.levels, stacks.shares(), n)
 
 
 def change_within_tick(

@@ -470,7 +470,8 @@ def without_rest(L: np.ndarray, tasks: Blend) -> Stacks:
     sets = [task for task in tasks.task_sets if task.name != REST]
     here = frozenset(range(len(sets)))
     blend = [Weighted(weight, present & here) for weight, present in tasks.corners]
-    return Stacks(whiten(sets, L), levels_of(sets), blend, len(sets) < len(tasks.task_sets))
+    names, damped = [task.name for task in sets], len(sets) < len(tasks.task_sets)
+    return Stacks(whiten(sets, L), levels_of(sets), blend, names, damped)
 
 
 def status(k: Given, tau: np.ndarray, info: LawInfo, found: Found) -> Status:

@@ -14,33 +14,46 @@ from opspace.machine.jit import jit
 
 
 @jit
+def weigh_places(work, stacks):
+    """How much of a task is at each of its places, and the levels below, into here and below (slots,).
+
+    Reads the slots and the corners with their weights; see `opspace.law.levels_below`.
+    """
+    slots = work.slots.shape[0]
+    below, absent = 0.0, 1.0
+    for s in range(slots - 1, -1, -1):
+        here = 1.0
+        for c in range(stacks):
+            if work.corner_on[c] & slot_bit(s) == 0:
+                here -= work.corner_weight[c]
+        work.here[s] = max(here, 0.0)
+        work.below[s] = below
+        absent *= 1.0 - work.here[s]
+        if s == 0 or work.slots[s - 1, 0] != work.slots[s, 0]:
+            below += 1.0 - absent
+            absent = 1.0
+
+
+@jit
 def task_metric(work, stacks):
     """W = I + Σ_l ω_l Σ_{k in l} h_k Ĵ_kᵀ Ĵ_k, into bounds.W (n, n); see `opspace.law.task_metric`.
 
     Reads the slots, the whitened rows Jw and the corners with their weights.
     """
-    n, slots = work.v.shape[0], work.slots.shape[0]
+    n = work.v.shape[0]
     W, Jw = work.bounds.W, work.Jw
+    weigh_places(work, stacks)
     for a in range(n):
         for b in range(n):
             W[a, b] = 0.0
         W[a, a] = 1.0
-    below, absent = 0.0, 1.0
-    for s in range(slots - 1, -1, -1):
-        h = 0.0
-        for c in range(stacks):
-            if work.corner_on[c] & slot_bit(s):
-                h += work.corner_weight[c]
-        weight = level_weight(below) * h
+    for s in range(work.slots.shape[0] - 1, -1, -1):
+        weight = level_weight(work.below[s]) * work.here[s]
         for row in range(work.slots[s, 1], work.slots[s, 1] + work.slots[s, 2]):
             for a in range(n):
                 factor = weight * Jw[row, a]
                 for b in range(a + 1):
                     W[a, b] += factor * Jw[row, b]
-        absent *= 1.0 - h
-        if s == 0 or work.slots[s - 1, 0] != work.slots[s, 0]:
-            below += 1.0 - absent
-            absent = 1.0
 
 
 @jit

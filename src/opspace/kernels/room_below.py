@@ -6,7 +6,7 @@ import math
 
 from opspace.kernels.compiled_scalars import level_weight
 from opspace.kernels.inertia import acceleration_of, unit_row, whitened_of
-from opspace.kernels.projection import project_on_bounds
+from opspace.kernels.projection import project_on_bounds, weigh_places
 from opspace.kernels.walk import slot_bit
 from opspace.law.scalars import BROKEN, LEFT, ROOM_CLEANINGS, ROOM_SOFT, UNBOUNDED, UNSEEN
 from opspace.machine.jit import jit
@@ -32,13 +32,14 @@ def leave_room(work, stacks, n):
     if not _over(work, work.joint_acceleration, BROKEN, n):
         return False
     whitened_of(work.inertia, work.joint_acceleration, bounds.z)
+    weigh_places(work, stacks)
     end, below = work.slots.shape[0], work.rest[n] != 0.0
     while end > 0:
         begin = _level_begin(work, end)
         share = _share(work, stacks, begin, end)
         if share > 0.0:
             if below:
-                _leave_above(work, stacks, end, share, n)
+                _leave_above(work, end, share, n)
             below = True
         end = begin
     for a in range(n):
@@ -88,7 +89,7 @@ def _over(work, acceleration, tolerance, n):
 
 
 @jit
-def _leave_above(work, stacks, first, share, n):
+def _leave_above(work, first, share, n):
     """Let what is wanted behind the first slots leave room; z is what all want together, √J/s."""
     bounds = work.bounds
     for a in range(n):
@@ -97,7 +98,7 @@ def _leave_above(work, stacks, first, share, n):
     acceleration_of(work.inertia, bounds.row)
     if not _over(work, bounds.row, 0.0, n):
         return
-    _motions_left(work, stacks, first, n)
+    _motions_left(work, first, n)
     count = _seen_rows(work, n)
     held = 0
     for _ in range(ROOM_CLEANINGS):
@@ -113,61 +114,116 @@ def _leave_above(work, stacks, first, share, n):
 
 
 @jit
-def _motions_left(work, stacks, first, n):
-    """P = Σ_T w_T (I + κ Σ Ĵᵀ Ĵ of the first slots + Σ ω Ĵᵀ Ĵ of the others)⁻¹, into bounds.P.
+def _motions_left(work, first, n):
+    """P of `opspace.law.motions_left` for the first slots, into bounds.P.
 
     Without the others it is what the first slots do not see; what is left of z goes into bounds.above.
     """
-    bounds = work.bounds
-    P, UD = bounds.P, bounds.UD
+    bounds, slots = work.bounds, work.slots.shape[0]
     for a in range(n):
         bounds.above[a] = bounds.z[a]
         for b in range(n):
-            P[a, b] = 0.0
-    for c in range(stacks):
-        present, weight = work.corner_on[c], work.corner_weight[c]
-        _not_seen(work, present, first, n)
-        _take_unseen(bounds, weight, n)
-        _narrow_by_others(work, present, first, n)
-        for k in range(n):
-            factor = weight * UD[k, k]
-            for a in range(k):
-                for b in range(a + 1):
-                    P[a, b] += factor * UD[k, a] * UD[k, b]
-                P[k, a] += factor * UD[k, a]
-            P[k, k] += factor
+            bounds.P[a, b] = 0.0
+    _count_places(work, first)
+    _nothing_seen(bounds, n)
+    share, e = 1.0, _next_seen(work, 0, first, -1)
+    while e >= 0:
+        if work.seen_share[e] < share:
+            _take_unseen(bounds, share - work.seen_share[e], n)
+            share = work.seen_share[e]
+        _see(work, e, n)
+        e = _next_seen(work, 0, first, e)
+    _take_unseen(bounds, share, n)
+    begin = slots
+    if share < 1.0:
+        begin = 0
+        _nothing_seen(bounds, n)
+    share, e = 1.0, _next_seen(work, begin, 2 * slots, -1)
+    while e >= 0:
+        if work.seen_share[e] < share:
+            _add_unseen(bounds, share - work.seen_share[e], n)
+            share = work.seen_share[e]
+        _see(work, e, n)
+        e = _next_seen(work, begin, 2 * slots, e)
+    _add_unseen(bounds, share, n)
     for a in range(n):
         for b in range(a):
-            P[b, a] = P[a, b]
+            bounds.P[b, a] = bounds.P[a, b]
 
 
 @jit
-def _not_seen(work, present, first, n):
-    """U D Uᵀ = (I + κ Σ Ĵᵀ Ĵ of the first slots)⁻¹ of one stack, into bounds.UD."""
-    UD = work.bounds.UD
-    for a in range(n):
-        for b in range(a):
-            UD[a, b] = 0.0
-        UD[a, a] = 1.0
-    for s in range(first):
-        if present & slot_bit(s):
-            for row in range(work.slots[s, 1], work.slots[s, 1] + work.slots[s, 2]):
-                _narrow(work.Jw[row], UNSEEN, n, UD, work.bounds.row)
+def _count_places(work, first):
+    """How much of each task the first slots have, and how much all, into seen_share (2 slots,).
+
+    What the rows count then goes into seen_weight: κ from entry 0 on, ω from entry ``slots`` on, each
+    at the first place of its task.
+    """
+    slots, size = work.slots, work.slots.shape[0]
+    for s in range(size):
+        work.seen_share[s], work.seen_share[size + s] = 0.0, 0.0
+    for s in range(size):
+        before = False
+        for p in range(s):
+            if slots[p, 1] == slots[s, 1]:
+                before = True
+        if before:
+            continue
+        above, others, count = 0.0, 0.0, 0.0
+        for p in range(s, size):
+            if slots[p, 1] == slots[s, 1]:
+                if p < first:
+                    above += work.here[p]
+                else:
+                    others += work.here[p]
+                    count += work.here[p] * work.below[p]
+        work.seen_share[s], work.seen_weight[s] = min(above, 1.0), UNSEEN
+        if others > 0.0:
+            work.seen_share[size + s] = min(above + others, 1.0)
+            work.seen_weight[size + s] = level_weight(count / others)
+            work.seen_weight[s] -= work.seen_weight[size + s]
 
 
 @jit
-def _narrow_by_others(work, present, first, n):
-    """Count in Σ ω Ĵᵀ Ĵ of the slots of one stack that are not the first."""
-    slots = work.slots
-    below, here = 0.0, 0.0
-    for s in range(slots.shape[0] - 1, first - 1, -1):
-        if present & slot_bit(s):
-            here = 1.0
-            for row in range(slots[s, 1], slots[s, 1] + slots[s, 2]):
-                _narrow(work.Jw[row], level_weight(below), n, work.bounds.UD, work.bounds.row)
-        if s == 0 or slots[s - 1, 0] != slots[s, 0]:
-            below += here
-            here = 0.0
+def _next_seen(work, begin, end, e):
+    """Entry of seen_share that follows entry e (-1: nothing), the largest first; -1 after the last."""
+    found, most = -1, 0.0
+    for i in range(begin, end):
+        share = work.seen_share[i]
+        if share > most and (
+            e < 0 or share < work.seen_share[e] or (share == work.seen_share[e] and i > e)
+        ):
+            found, most = i, share
+    return found
+
+
+@jit
+def _nothing_seen(bounds, n):
+    """U D Uᵀ = I."""
+    for a in range(n):
+        for b in range(a):
+            bounds.UD[a, b] = 0.0
+        bounds.UD[a, a] = 1.0
+
+
+@jit
+def _see(work, e, n):
+    """Count the rows of an entry in."""
+    s = e % work.slots.shape[0]
+    for row in range(work.slots[s, 1], work.slots[s, 1] + work.slots[s, 2]):
+        _narrow(work.Jw[row], work.seen_weight[e], n, work.bounds.UD, work.bounds.row)
+
+
+@jit
+def _add_unseen(bounds, weight, n):
+    """Add U D Uᵀ to the lower half of bounds.P."""
+    P, UD = bounds.P, bounds.UD
+    for k in range(n):
+        factor = weight * UD[k, k]
+        for a in range(k):
+            for b in range(a + 1):
+                P[a, b] += factor * UD[k, a] * UD[k, b]
+            P[k, a] += factor * UD[k, a]
+        P[k, k] += factor
 
 
 @jit
@@ -195,7 +251,7 @@ def _narrow(row, weight, n, UD, gain):
 
 @jit
 def _take_unseen(bounds, weight, n):
-    """Take U D Uᵀ z, as far as a stack is there, from bounds.above."""
+    """Take U D Uᵀ z from bounds.above."""
     UD, z, above = bounds.UD, bounds.z, bounds.above
     for k in range(n):
         f = z[k]

@@ -8,6 +8,7 @@ from opspace.law.nearest import (
     Nearest,
     excess,
     excess_of_rows,
+    levels_below,
     nearest_acceleration,
     task_metric,
 )
@@ -43,6 +44,7 @@ __all__ = [
     "intermediate_values",
     "leaning_chain",
     "leave_room",
+    "levels_below",
     "levels_of",
     "motions_left",
     "nearest_acceleration",

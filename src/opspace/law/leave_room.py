@@ -12,7 +12,7 @@ from jaxtyping import Float
 
 from opspace.law.blending import Weighted
 from opspace.law.hierarchy import Level, WhitenedTask
-from opspace.law.nearest import cleaned
+from opspace.law.nearest import cleaned, levels_below
 from opspace.law.scalars import (
     BROKEN,
     LEFT,
@@ -31,13 +31,37 @@ class Stacks(NamedTuple):
         whitened: Every task set.
         levels: Their levels, most important first.
         corners: Weights and members of the stacks, as indices into ``whitened``.
+        tasks: Which task each set is: the same one at two levels while a task moves.
         damped: Whether what no task uses is damped.
     """
 
     whitened: Sequence[WhitenedTask]
     levels: Sequence[Level]
     corners: Sequence[Weighted]
+    tasks: Sequence[str]
     damped: bool
+
+    def shares(self) -> list[float]:
+        """Tell how much of each task set is there, h_k; those of all stacks are 1 exactly."""
+        missing = [
+            sum(weight for weight, present in self.corners if k not in present)
+            for k in range(len(self.whitened))
+        ]
+        return [max(1.0 - part, 0.0) for part in missing]
+
+
+class Seen(NamedTuple):
+    """Rows that count, as far as something is there.
+
+    Attributes:
+        share: How much of it is there.
+        weight: How often they count.
+        J: (m, n) the rows.
+    """
+
+    share: float
+    weight: float
+    J: Float[np.ndarray, "m n"]
 
 
 class RoomLeft(NamedTuple):
@@ -57,11 +81,16 @@ class RoomLeft(NamedTuple):
 def motions_left(stacks: Stacks, first: int, n: int, *, weighed: bool) -> Float[np.ndarray, "n n"]:
     """Project on the motions that the first levels do not see, smoothly.
 
-        P_l = Σ_T w_T (I + κ Σ_{k in T, l(k) <= l} Ĵ_kᵀ Ĵ_k + Σ_{k in T, l(k) > l} ω_k Ĵ_kᵀ Ĵ_k)⁻¹
+        P_l = ∫₀¹ (I + κ Σ_{h_k >= θ} Ĵ_kᵀ Ĵ_k + Σ_{h_k < θ <= g_k} ω_k Ĵ_kᵀ Ĵ_k)⁻¹ dθ
 
-    Of each stack T the rows of the levels up to l count κ = 10⁵ times. Without weights ω = 0; with
-    them ω is that of `task_metric` in T: of the motions that are left, those that levels below see
-    count more the higher they are.
+    with h_k how much of task k is at the levels up to l, and g_k how much at any. Rows of the levels
+    up to l count κ = 10⁵ times. Without weights ω = 0; with them it is the `level_weight` of
+    `levels_below`, in the mean where k is on its way between such levels: of the motions that are
+    left, those that levels below see count more the higher they are.
+
+    The integral is a sum over as many stacks as there are different h and g, one more with each, so
+    every row is counted in once however many tasks are on their way. P_l changes by no more than h
+    and g do, and where they are 0 or 1 it is that of the stack.
 
     Args:
         stacks: What is mixed.
@@ -72,19 +101,35 @@ def motions_left(stacks: Stacks, first: int, n: int, *, weighed: bool) -> Float[
     Returns:
         P_l, (n, n).
     """
-    P = np.zeros((n, n))
-    for weight, present in stacks.corners:
-        S = np.eye(n)
-        below = 0
-        for place, level in reversed(list(enumerate(stacks.levels))):
-            here = level.members & present
-            factor = UNSEEN if place < first else level_weight(below) if weighed else 0.0
-            if factor > 0.0:
-                for row in (row for k in sorted(here) for row in stacks.whitened[k].J):
-                    S = narrowed(S, row, factor)
-            below += bool(here)
-        P += weight * S @ S.T
-    return P
+    P, S, before = np.zeros((n, n)), np.eye(n), 1.0
+    for share, weight, J in _seen(stacks, first, weighed):
+        P += (before - share) * S @ S.T
+        for row in J:
+            S = narrowed(S, row, weight)
+        before = share
+    return P + before * S @ S.T
+
+
+def _seen(stacks: Stacks, first: int, weighed: bool) -> list[Seen]:
+    """What counts for the first levels, with the largest share first."""
+    shares, found = stacks.shares(), list[Seen]()
+    above: dict[str, list[float]] = {task: [] for task in stacks.tasks}
+    below: dict[str, list[tuple[float, float]]] = {task: [] for task in stacks.tasks}
+    for place, count in enumerate(levels_below(stacks.levels, shares)):
+        for k in stacks.levels[place].members:
+            if place < first:
+                above[stacks.tasks[k]].append(shares[k])
+            else:
+                below[stacks.tasks[k]].append((shares[k], count))
+    for task, J in zip(stacks.tasks, (one.J for one in stacks.whitened), strict=True):
+        here, there = min(sum(above.pop(task, ())), 1.0), below.pop(task, ())
+        others, weight = sum(share for share, _ in there), 0.0
+        if weighed and others > 0.0:
+            weight = level_weight(sum(share * count for share, count in there) / others)
+            found.append(Seen(min(here + others, 1.0), weight, J))
+        if here > 0.0:
+            found.append(Seen(here, UNSEEN - weight, J))
+    return sorted(found, key=lambda seen: -seen.share)
 
 
 def narrowed(

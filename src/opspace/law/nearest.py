@@ -4,6 +4,7 @@
 # pyright: strict, reportConstantRedefinition=false, reportUnknownMemberType=false
 # pyright: reportUnknownVariableType=false, reportUnknownArgumentType=false
 # pyright: reportMissingTypeStubs=false
+import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -45,15 +46,32 @@ class Nearest(NamedTuple):
     rows: Float[np.ndarray, " k"]
 
 
+def levels_below(levels: Sequence[Level], shares: Sequence[float]) -> list[float]:
+    """Count the levels below each, those on their way in part.
+
+    A level counts as far as anything of it is there, 1 − Π (1 − h_k), so nothing steps where one comes
+    or goes.
+
+    Args:
+        levels: Their members, most important first.
+        shares: h_k, how much of each task set is there.
+    """
+    counts: list[float] = []
+    below = 0.0
+    for level in reversed(levels):
+        counts.insert(0, below)
+        below += 1.0 - math.prod(1.0 - shares[k] for k in level.members)
+    return counts
+
+
 def task_metric(
     whitened: Sequence[WhitenedTask], levels: Sequence[Level], shares: Sequence[float], n: int
 ) -> Float[np.ndarray, "n n"]:
     """Measure how far an acceleration is from another by what the tasks see of the difference.
 
-        W = I + Σ_l ω_l Σ_{k in l} h_k Ĵ_kᵀ Ĵ_k,   ω_l = `level_weight` of the levels below
+        W = I + Σ_l ω_l Σ_{k in l} h_k Ĵ_kᵀ Ĵ_k,   ω_l = `level_weight` of `levels_below`
 
-    in x = Lᵀ q̈, where the inertia is I. A level counts as far as anything is there, 1 − Π (1 − h_k):
-    W is a polynomial in the activations and so does not step where a level comes or goes.
+    in x = Lᵀ q̈, where the inertia is I: smooth in the activations.
 
     Args:
         whitened: Every task set.
@@ -65,14 +83,9 @@ def task_metric(
         W, (n, n).
     """
     W = np.eye(n)
-    below = 0.0
-    for level in reversed(levels):
-        absent = 1.0
+    for level, below in zip(levels, levels_below(levels, shares), strict=True):
         for k in sorted(level.members):
-            J = whitened[k].J
-            W += level_weight(below) * shares[k] * (J.T @ J)
-            absent *= 1.0 - shares[k]
-        below += 1.0 - absent
+            W += level_weight(below) * shares[k] * (whitened[k].J.T @ whitened[k].J)
     return W
 
 
