@@ -152,6 +152,8 @@ def test_fewer_targets_are_missed_with_two_buffers(script):
     for row in rows:
         missed = {name: int(row[f"{name}_missed"]) for name in targets.VARIANTS}
         assert missed["two"] < missed["one"] <= int(row["reached without handling"])
+        assert missed["rest"] <= missed["two"]
+        assert row["rest_late"] == "0"
 
 
 @pytest.mark.slow
@@ -160,4 +162,5 @@ def test_the_targets_are_todays(script):
     written = {row["robot"]: row for row in script("buffer_document").read_csv(targets.CSV)}
     again = run_again("[t.measured(s.osc.load_robot(name)) for name in ('panda', 'ur5')]")
     for name, row in zip(("panda", "ur5"), again, strict=True):
-        assert row["two_missed"] == written[name]["two_missed"]
+        for key in ("two_missed", "rest_missed", "rest_late"):
+            assert row[key] == written[name][key]

@@ -82,7 +82,7 @@ def test_the_compiled_law_is_the_law(seed, smooth, blending):
     L = np.linalg.cholesky(M)
     blend = corners([task.activation for task in tasks], blending)
     option = SigmaBuffer(0.2, 1.0) if smooth else None
-    buffer = np.array([float(smooth), 0.2, 1.0, PROFILES.index("quintic"), 1.0, 0.0])
+    buffer = np.array([float(smooth), 0.2, 1.0, PROFILES.index("quintic"), 1.0, 0.0, 0.1, 0.3, 0.4])
     expected, _ = blended_torque(L, tasks, blend, option)
     tau = compiled_torque(L, tasks, blend, buffer)
     scale = max(1.0, float(np.max(np.abs(expected))))
@@ -141,6 +141,8 @@ def test_just_above_a_small_buffer_the_last_level_keeps_its_digits(seed, decades
     tasks = [TaskSet(J, rng.normal(size=n + more), 0, 1.0, "a", 1.0)]
     blend = corners([1.0], "idv")
     expected, _ = blended_torque(np.eye(n), tasks, blend, SigmaBuffer(upper / 5.0, upper))
-    buffer = np.array([1.0, upper / 5.0, upper, PROFILES.index("quintic"), upper, 0.0])
+    buffer = np.array(
+        [1.0, upper / 5.0, upper, PROFILES.index("quintic"), upper, 0.0, upper, upper, upper]
+    )
     found = compiled_torque(np.eye(n), tasks, blend, buffer)
     np.testing.assert_allclose(found, expected, rtol=0, atol=1e-9 * np.linalg.norm(expected))

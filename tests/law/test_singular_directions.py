@@ -230,3 +230,59 @@ def test_the_directions_are_reported():
 def test_a_buffer_needs_increasing_positive_edges(edges):
     with pytest.raises(InputError, match="sigma buffer needs 0 < lower < upper"):
         SigmaBuffer(*edges)
+
+
+# -- at rest ---------------------------------------------------------------------------------------
+
+TWO = SigmaBuffer(0.05, 0.7, release=0.3, damping=10.0)
+
+
+@given(sigma=st.floats(0.0, 1.0), more=st.floats(0.0, 0.1), unrest=st.floats(0.0, 1.5))
+def test_what_is_there_grows_with_sigma_and_answers_no_more_than_it_is_there(sigma, more, unrest):
+    assert TWO.activation(sigma, unrest) <= TWO.activation(sigma + more, unrest) + 1e-15
+    assert TWO.response(sigma, unrest) <= TWO.response(sigma + more, unrest) + 1e-15
+    assert TWO.response(sigma, unrest) <= TWO.activation(sigma, unrest) + 1e-15
+
+
+@given(sigma=st.floats(0.0, 1.0))
+def test_far_from_rest_the_buffers_are_those_of_motion(sigma):
+    bare = SigmaBuffer(0.05, 0.7), SigmaBuffer(0.05, 0.3)
+    for unrest in (1.0, 3.0):
+        assert TWO.response(sigma, unrest) == bare[0].response(sigma)
+        assert TWO.activation(sigma, unrest) == bare[1].activation(sigma)
+    assert TWO.response(sigma, 0.0) == (1.0 if sigma >= 0.05 else TWO.response(sigma, 0.0))
+    one = SigmaBuffer(0.05, 0.7)
+    for unrest in (0.0, 0.5, 1.0):  # the paper's form knows no rest
+        assert one.response(sigma, unrest) == one.activation(sigma, unrest) == one.response(sigma)
+
+
+@examples(40)
+@given(seed=SEEDS, unrest=st.floats(0.0, 1.0), smallest=st.floats(0.0, 0.5))
+def test_torque_is_continuous_in_how_far_a_level_is_from_rest(seed, unrest, smallest):
+    """Also where σ is zero or two are equal."""
+    sweep = Sweep(seed)
+
+    def torque(unrest):
+        tasks = whitened_stack(
+            sweep.L, sweep.U, np.array([0.6, smallest, smallest]), sweep.V, sweep.f, sweep.below
+        )
+        tasks[0] = TaskSet(tasks[0].J, tasks[0].f, 0, unrest=unrest)
+        return task_torque(sweep.L @ sweep.L.T, tasks, singular=TWO)
+
+    step = np.max(np.abs(torque(unrest + 1e-7) - torque(unrest)))
+    assert step <= 1e-4 * max(1.0, np.max(np.abs(torque(0.0))))
+
+
+@given(seed=SEEDS)
+def test_at_rest_the_law_is_the_plain_one_above_the_lower_edge(seed):
+    sweep = Sweep(seed)
+    tasks = whitened_stack(
+        sweep.L, sweep.U, np.array([0.6, 0.2, 0.051]), sweep.V, sweep.f, sweep.below
+    )
+    tasks[0] = TaskSet(tasks[0].J, tasks[0].f, 0, unrest=0.0)
+    M = sweep.L @ sweep.L.T
+    found, plain = task_torque(M, tasks, singular=TWO), task_torque(M, tasks)
+    # Levels below may be singular themselves, and far.
+    alone = task_torque(M, tasks[:1], singular=TWO), task_torque(M, tasks[:1])
+    np.testing.assert_allclose(alone[0], alone[1], atol=1e-9 * np.max(np.abs(plain)))
+    assert np.all(np.isfinite(found))

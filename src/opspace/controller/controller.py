@@ -35,6 +35,9 @@ from opspace.kernels.columns import (
     PERIOD,
     REACH,
     RELEASE_UPPER,
+    REST_LOWER,
+    REST_RELEASE,
+    REST_UPPER,
     ROOM,
     SIGMA_DAMPING,
     SIGMA_LOWER,
@@ -588,6 +591,7 @@ class Controller(ReferenceController):
             option[SIGMA_LOWER], option[SIGMA_UPPER] = buffer.lower, buffer.upper
             option[SIGMA_PROFILE] = PROFILES.index(buffer.profile)
             option[RELEASE_UPPER], option[SIGMA_DAMPING] = buffer.release_upper, buffer.damping
+            option[REST_LOWER], option[REST_RELEASE], option[REST_UPPER] = buffer.at_rest
         option[DAMPING] = self.damping
         option[TASK_BIAS] = float(self.bias == "task")
         option[ROOM], option[REACH] = self._blending.room, self._blending.reach

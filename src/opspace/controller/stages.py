@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
@@ -40,7 +41,7 @@ from opspace.law import (
     whiten,
 )
 from opspace.law.blending import combined
-from opspace.law.scalars import LOOKS, SCALED, SEEN, room_for
+from opspace.law.scalars import LOOKS, SCALED, SEEN, room_for, unrest_of
 from opspace.plan.scales import Scales
 from opspace.robots.adapter import spread_of
 from opspace.robots.protocol import Robot
@@ -302,6 +303,7 @@ def whiten_tasks(
     members, rules = k.members, k.rules
     rank = {level: i for i, level in enumerate(mixed.levels)}
     references = rules.scales.references([members[i].task for i, _ in mixed.slots])
+    speed = float(np.linalg.norm(L.T @ k.v))
     fade = h if rules.blending.fades_commands else [1.0] * len(h)
     sets = [
         TaskSet(
@@ -311,6 +313,7 @@ def whiten_tasks(
             1.0,
             members[i].task.name,
             reference,
+            _unrest(rules.scales.near(members[i].task), terms[i].error, speed, reference),
         )
         for (i, level), reference in zip(mixed.slots, references, strict=True)
     ]
@@ -326,6 +329,12 @@ def whiten_tasks(
     sets.append(TaskSet(L.T, rest, len(rank), 1.0, REST, rules.scales.unit))
     last = len(sets) - 1
     return Blend(sets, [Weighted(w, present | {last}) for w, present in mixed.corners])
+
+
+def _unrest(near: np.ndarray, error: np.ndarray, speed: float, reference: np.ndarray) -> float:
+    """How far a task is from rest at its target, see `opspace.law.scalars.unrest_of`."""
+    rows = zip(near.tolist(), error.tolist(), reference.tolist(), strict=True)
+    return math.sqrt(sum(unrest_of(e, x, speed, usual) for e, x, usual in rows))
 
 
 def law(

@@ -18,6 +18,8 @@ from opspace.kernels.columns import (
     POSE,
     QUANTITY,
     RELEASE_UPPER,
+    REST_LOWER,
+    REST_RELEASE,
     ROWS,
     SIGMA_LOWER,
     SIGMA_PROFILE,
@@ -26,7 +28,7 @@ from opspace.kernels.columns import (
     TOOL_AXES,
     slot_bit,
 )
-from opspace.kernels.compiled_scalars import profile
+from opspace.kernels.compiled_scalars import fade
 from opspace.kernels.motion import measure, selected
 
 LEARNS = int(Status.OK | Status.DIRECTION_OFF | Status.LATE)
@@ -172,9 +174,12 @@ def _project(work, robot, i, depth, m, before):
         if sigma[j] == 0.0:
             continue
         if option[SINGULAR] != 0.0:
-            above = sigma[j] * sigma[j] - option[SIGMA_LOWER]
-            width = option[RELEASE_UPPER] - option[SIGMA_LOWER]
-            if profile(int(option[SIGMA_PROFILE]), above / width) < 1.0 - 1e-9:
+            here = fade(
+                int(option[SIGMA_PROFILE]), sigma[j] * sigma[j], option[SIGMA_LOWER],
+                option[RELEASE_UPPER], option[REST_LOWER], option[REST_RELEASE],
+                space.unrest_there[depth],
+            )  # fmt: skip
+            if here < 1.0 - 1e-9:
                 continue
         along = 0.0
         for r in range(rows):

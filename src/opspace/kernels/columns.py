@@ -62,6 +62,9 @@ VARIABLE_SIZE = 9
     SIGMA_PROFILE,
     RELEASE_UPPER,
     SIGMA_DAMPING,
+    REST_LOWER,
+    REST_RELEASE,
+    REST_UPPER,
     DAMPING,
     TASK_BIAS,
     ROOM,
@@ -77,8 +80,8 @@ VARIABLE_SIZE = 9
     KEEP_TORQUE,
     PERIOD,
     BASE,
-) = range(21)
-OPTION_SIZE = 21
+) = range(24)
+OPTION_SIZE = 24
 
 # What a tick answers when there is no torque.
 STATE_NOT_FINITE, NOT_FINITE, NOT_POSITIVE_DEFINITE = -1, -2, -3

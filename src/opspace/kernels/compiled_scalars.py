@@ -21,6 +21,8 @@ def _compiled() -> dict[str, Any]:
 _COMPILED = _compiled()
 
 profile = _COMPILED["profile"]
+fade = _COMPILED["fade"]
+unrest_of = _COMPILED["unrest_of"]
 ramp = _COMPILED["ramp"]
 admissible_command = _COMPILED["admissible_command"]
 closing_command = _COMPILED["closing_command"]

@@ -15,7 +15,7 @@ from opspace.kernels.algebra import (
     solve_upper,
     solve_upper_transposed,
 )
-from opspace.kernels.compiled_scalars import profile
+from opspace.kernels.compiled_scalars import fade
 from opspace.law.scalars import RANK_TOLERANCE
 from opspace.machine.jit import jit
 
@@ -73,8 +73,9 @@ def solve_level(d, count, n, J, last, buffer, space):
         n: Number of joints.
         J: (rows, n) whitened rows of every task set.
         last: Whether nothing is below, so that what is left free does not matter.
-        buffer: (on, lower, upper, profile, upper edge of the release, damping), see
-            `opspace.law.SigmaBuffer`; without ``on`` only exact dependence is removed.
+        buffer: (on, lower, upper, profile, upper edge of the release, damping, then lower edge, that of
+            the release and upper edge at rest), see `opspace.law.SigmaBuffer`; without ``on`` only
+            exact dependence is removed.
         space: `SPACE`; B and residual are read, u, Z, free of depth d + 1 written, or for a level
             that branches V, strength, share.
 
@@ -415,14 +416,17 @@ def _alternatives(d, m, n, used, rank, threshold, buffer, space):
         space.C,
         space.residual,
     )
-    before = 1.0
+    before, unrest = 1.0, 0.0
+    for i in range(m):
+        unrest += space.unrest[space.rows[i]]
+    unrest = math.sqrt(unrest)
     faded = 0
     for i in range(rank):
         h, response = 0.0, 1.0
         if buffer[0] != 0.0:
-            above = sigma[i] * sigma[i] - buffer[1]
-            response = profile(int(buffer[3]), above / (buffer[2] - buffer[1]))
-            h = profile(int(buffer[3]), above / (buffer[4] - buffer[1]))
+            code, square = int(buffer[3]), sigma[i] * sigma[i]
+            response = fade(code, square, buffer[1], buffer[2], buffer[6], buffer[8], unrest)
+            h = fade(code, square, buffer[1], buffer[4], buffer[6], buffer[7], unrest)
         elif sigma[i] > threshold:
             h = 1.0
         strength[d, i] = 0.0

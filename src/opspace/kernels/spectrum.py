@@ -5,12 +5,15 @@ from __future__ import annotations
 from opspace.kernels.algebra import singular_values
 from opspace.kernels.columns import (
     RELEASE_UPPER,
+    REST_LOWER,
+    REST_RELEASE,
+    REST_UPPER,
     SIGMA_LOWER,
     SIGMA_PROFILE,
     SIGMA_UPPER,
     SINGULAR,
 )
-from opspace.kernels.compiled_scalars import profile
+from opspace.kernels.compiled_scalars import fade
 from opspace.machine.jit import jit
 
 
@@ -19,7 +22,7 @@ def spectrum(level):
     """Directions of a level, strongest first: σ, activation, response, vectors as columns (Eq. 25).
 
     Args:
-        level: `opspace.plan.records.SPECTRUM`; reads B and option.
+        level: `opspace.plan.records.SPECTRUM`; reads B, option and unrest.
     """
     B, C, Y, sigma, option = level.B, level.C, level.Y, level.sigma, level.option
     m, free = B.shape
@@ -41,8 +44,17 @@ def spectrum(level):
                 level.directions[a, i] = C[i, a] / sigma[i]
         sigma[i] *= sigma[i]
         if option[SINGULAR] != 0.0:
-            above, code = sigma[i] - option[SIGMA_LOWER], int(option[SIGMA_PROFILE])
-            level.response[i] = profile(code, above / (option[SIGMA_UPPER] - option[SIGMA_LOWER]))
-            level.activation[i] = profile(
-                code, above / (option[RELEASE_UPPER] - option[SIGMA_LOWER])
+            code, lower, rest = int(option[SIGMA_PROFILE]), option[SIGMA_LOWER], option[REST_LOWER]
+            level.response[i] = fade(
+                code,
+                sigma[i],
+                lower,
+                option[SIGMA_UPPER],
+                rest,
+                option[REST_UPPER],
+                level.unrest[0],
             )
+            level.activation[i] = fade(
+                code, sigma[i], lower, option[RELEASE_UPPER], rest, option[REST_RELEASE],
+                level.unrest[0],
+            )  # fmt: skip

@@ -31,7 +31,7 @@ from opspace.kernels.columns import (
     TASK_BIAS,
     WORLD,
 )
-from opspace.kernels.compiled_scalars import leaning, ramp
+from opspace.kernels.compiled_scalars import leaning, ramp, unrest_of
 from opspace.kernels.contact_rows import close_contacts, contact_corners, evaluate_contacts
 from opspace.kernels.corners import corners, insert, sort_corners
 from opspace.kernels.distances import measure_distances
@@ -250,6 +250,22 @@ def damp_rest(work, n):
 
 
 @jit
+def rest_of_rows(work, n):
+    """How far every row is from rest at its target, squared, into space.unrest (rows + limits,)."""
+    speed = 0.0
+    for a in range(n):
+        speed += work.space.motion[a] * work.space.motion[a]
+    speed = math.sqrt(speed)
+    for row in range(work.error.shape[0]):
+        weight = work.row_weight[row]
+        work.space.unrest[row] = unrest_of(
+            work.row_near[row], work.error[row], speed, 1.0 / (weight * weight)
+        )
+    for row in range(work.error.shape[0], work.space.unrest.shape[0]):
+        work.space.unrest[row] = 1.0
+
+
+@jit
 def law(work, stacks, limit_stacks):
     """û = Σ_T w_T H(T; f̃) of the stacks, under the joint limits that take part (Eq. 20, Eq. 23).
 
@@ -266,6 +282,7 @@ def law(work, stacks, limit_stacks):
         start_inside(work, n)
     if work.option[SINGULAR] != 0.0:
         whitened_of(work.inertia, work.v, space.motion)
+        rest_of_rows(work, n)
     for a in range(n):
         work.u[a] = 0.0
     begin(n, levels, space)

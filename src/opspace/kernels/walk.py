@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from opspace.kernels import columns
 from opspace.kernels.compiled_scalars import room_for
 from opspace.kernels.inertia import torque_of
@@ -214,6 +216,9 @@ def _remember(d, count, share, present, space):
     space.top[d] = share
     space.chosen[d] = present
     space.width[d] = r
+    unrest = 0.0
     for i in range(count):
+        unrest += space.unrest[space.rows[i]]
         for b in range(r):
             kept[first + i, b] = B[i, b]
+    space.unrest_there[d] = math.sqrt(unrest)

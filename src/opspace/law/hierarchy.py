@@ -27,10 +27,12 @@ class WhitenedTask:
     Attributes:
         J: Ĵ_k = W J_k L⁻ᵀ with W = diag(sigma_reference)^(−1/2), shape (m, n).
         f: W f̃_k, shape (m,).
+        unrest: How far it is from rest at its target.
     """
 
     J: Float[np.ndarray, "m n"]
     f: Float[np.ndarray, " m"]
+    unrest: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -71,7 +73,7 @@ def whiten(tasks: Sequence[TaskSet], L: Float[np.ndarray, "n n"]) -> list[Whiten
     for task in tasks:
         weight = 1.0 / np.sqrt(task.sigma_reference)
         rows = stacked[row : row + weight.size]
-        whitened.append(WhitenedTask(weight[:, None] * rows, weight * task.f))
+        whitened.append(WhitenedTask(weight[:, None] * rows, weight * task.f, task.unrest))
         row += weight.size
     return whitened
 

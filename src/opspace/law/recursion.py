@@ -97,7 +97,9 @@ def law_recursion(
     def solve(
         present: frozenset[int], values: Sequence[Float[np.ndarray, " _"]]
     ) -> Float[np.ndarray, " n"]:
-        fed = [WhitenedTask(task.J, f) for task, f in zip(whitened, values, strict=True)]
+        fed = [
+            WhitenedTask(task.J, f, task.unrest) for task, f in zip(whitened, values, strict=True)
+        ]
         return hard_law(fed, levels, present, n, compensate=compensate)
 
     return Recursion(

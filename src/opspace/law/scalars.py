@@ -62,6 +62,42 @@ def profile(code: int, s: float) -> float:
     return min(max(h, 0.0), 1.0)
 
 
+def fade(
+    code: int, sigma: float, lower: float, upper: float, rest_lower: float, rest_upper: float,
+    unrest: float,
+) -> float:  # fmt: skip
+    """Evaluate how much of a direction with the eigenvalue σ is there.
+
+    A buffer for what moves or has a way to go, and a lower one for what is nearly at rest at its
+    target, mixed by the profile of ``unrest``: 0 at rest there, 1 far away or fast.
+    """
+    moving = profile(code, unrest)
+    here = 0.0
+    if moving > 0.0:
+        here = moving * profile(code, (sigma - lower) / (upper - lower))
+    if moving < 1.0:
+        here += (1.0 - moving) * profile(code, (sigma - rest_lower) / (rest_upper - rest_lower))
+    return here
+
+
+def unrest_of(near: float, error: float, speed: float, reference: float) -> float:
+    """Evaluate the square of what a row adds to how far its level is from rest at its target.
+
+    Args:
+        near: 1/e₀, 1/m or 1/rad; 0 for rows that are never at rest.
+        error: x_d − x, m or rad.
+        speed: ‖Lᵀ q̇‖, √J: the square root of twice the kinetic energy.
+        reference: σ that is usual for the row, 1/kg or 1/(kg·m²).
+
+    Returns:
+        (e/e₀)² + ‖Lᵀ q̇‖² reference/(e₀ `HURRY`)²: the arm as a whole moves a row as fast as that.
+    """
+    if near == 0.0:
+        return 1.0
+    hurry = speed / HURRY
+    return near * near * (error * error + hurry * hurry * reference)
+
+
 def profile_derivatives(code: int, s: float) -> tuple[float, float]:
     """Evaluate dh/ds and d²h/ds²."""
     if s <= 0.0 or s >= 1.0 or code == STEP:
@@ -637,6 +673,14 @@ def level_weight(below: float) -> float:
     return min(LEVEL_RATIO**below, MOST_WEIGHT)
 
 
+NEAR = 0.3
+"""How far from its target a task in metres is anything but at rest there, m."""
+NEAR_TURN = 1.0
+"""The same of a task in radians."""
+HURRY = 1.0 / 3.0
+"""A task that would be `NEAR` its target after 1/HURRY seconds moves fast, 1/s."""
+REST_LOWER, REST_RELEASE, REST_UPPER = 0.2, 0.6, 1.0
+"""Edges of the buffers at rest, as multiples of the lower edge of those in motion."""
 LEFT = 0.5
 """Part of what a limit allows its joint that levels may use which are not the first."""
 UNSEEN = 1e5

@@ -18,7 +18,13 @@ from jaxtyping import Float
 from opspace.errors import InputError
 from opspace.law.activation import Buffer
 from opspace.law.hierarchy import Partial
-from opspace.law.scalars import PROFILES, profile
+from opspace.law.scalars import (
+    PROFILES,
+    REST_LOWER,
+    REST_RELEASE,
+    REST_UPPER,
+    fade,
+)
 
 
 @dataclass(frozen=True)
@@ -31,6 +37,11 @@ class SigmaBuffer:
     is ρ times what the tasks ask for, and 1 − ρ times damping of the joint motion along it. At rest this
     leaves no error. The second, its *activation* h(σ), falls only from ``release`` to ``lower``.
 
+    Where a level rests at its targets inside the release, the levels below would pull it off them. So
+    there are two pairs of buffers: these, and a pair below them for levels at rest, from 0.2 to 1 and
+    (the release) to 0.6 times ``lower``, mixed by the profile of how far from rest a level is
+    (``TaskSet.unrest``). What is asked for near rest is small, and its torque too, at small σ.
+
     Eigenvalues are those of the rows as the task sets scale them: with ``TaskSet.sigma_reference`` left
     at 1 they are in 1/kg and 1/(kg·m²) and the buffer is absolute, as in the paper (0.01 to 0.02); with
     a reference given they are dimensionless multiples of it and the buffer is relative.
@@ -40,7 +51,7 @@ class SigmaBuffer:
         upper: σ at and above which a direction answers in full.
         profile: Name of the activation profile.
         release: σ at and above which a direction belongs to its level alone; None is ``upper``, the one
-            buffer of the paper, in which response and activation are the same.
+            buffer of the paper, in which response and activation are the same, also at rest.
         damping: d of the joint motion along a direction that answers in part, 1/s.
 
     Raises:
@@ -71,18 +82,25 @@ class SigmaBuffer:
         """Upper edge of the release."""
         return self.upper if self.release is None else self.release
 
-    def activation(self, sigma: float) -> float:
+    @property
+    def at_rest(self) -> tuple[float, float, float]:
+        """Lower edge, upper edge of the release and upper edge at rest."""
+        if self.release is None:
+            return self.lower, self.upper, self.upper
+        release = min(REST_RELEASE * self.lower, self.release_upper)
+        return REST_LOWER * self.lower, release, min(REST_UPPER * self.lower, self.upper)
+
+    def activation(self, sigma: float, unrest: float = 1.0) -> float:
         """Activation h(σ) of a direction, 0 below the buffer and 1 above the release."""
-        return self._step(sigma, self.release_upper)
+        return self._there(sigma, self.release_upper, self.at_rest[1], unrest)
 
-    def response(self, sigma: float) -> float:
+    def response(self, sigma: float, unrest: float = 1.0) -> float:
         """Response ρ(σ) of a direction, 0 below the buffer and 1 above; never more than h."""
-        return self._step(sigma, self.upper)
+        return self._there(sigma, self.upper, self.at_rest[2], unrest)
 
-    def _step(self, sigma: float, upper: float) -> float:
-        if not self.lower < sigma < upper:
-            return float(sigma >= upper)
-        return profile(PROFILES.index(self.profile), (sigma - self.lower) / (upper - self.lower))
+    def _there(self, sigma: float, upper: float, rest_upper: float, unrest: float) -> float:
+        code = PROFILES.index(self.profile)
+        return fade(code, sigma, self.lower, upper, self.at_rest[0], rest_upper, unrest)
 
 
 @dataclass(frozen=True)
@@ -124,6 +142,7 @@ def solve_level_smoothly(
     buffer: SigmaBuffer,
     motion: Float[np.ndarray, " n"],
     *,
+    unrest: float = 1.0,
     want_spectrum: bool = False,
 ) -> LevelOutcome:
     """Add one level whose weak directions fade out (Section 4.1 of the paper).
@@ -143,6 +162,7 @@ def solve_level_smoothly(
         above: Result of the levels above.
         buffer: Where directions fade.
         motion: Whitened velocity y, shape (n,).
+        unrest: How far the level is from rest at its targets.
         want_spectrum: Compute the spectrum even where the certificate makes it unnecessary.
 
     Returns:
@@ -156,10 +176,10 @@ def solve_level_smoothly(
             return LevelOutcome([Alternative(1.0, certified)], None)
     U, s, Vt = np.linalg.svd(JN)
     sigma = s**2
-    activation = np.array([buffer.activation(x) for x in sigma.tolist()])
+    activation = np.array([buffer.activation(x, unrest) for x in sigma.tolist()])
     response = activation
     if buffer.release is not None:
-        response = np.array([buffer.response(x) for x in sigma.tolist()])
+        response = np.array([buffer.response(x, unrest) for x in sigma.tolist()])
     k = s.size
     strength = np.zeros(k)
     on = activation > 0.0

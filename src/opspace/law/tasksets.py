@@ -28,6 +28,8 @@ class TaskSet:
             (m,). Rows are divided by its square root wherever rows are weighed against each other:
             in the spectrum that singular directions are taken from, and in the least-squares
             compromise of a level that cannot be satisfied. 1 leaves both in SI units, as in the paper.
+        unrest: How far the task is from rest at its target: 0 at rest there, 1 and more far away or
+            fast. Singular directions of a level at rest fade later, see `opspace.law.SigmaBuffer`.
 
     Raises:
         InputError: A shape or value cannot be used; the message names the task set.
@@ -39,6 +41,7 @@ class TaskSet:
     activation: float
     name: str
     sigma_reference: Float[np.ndarray, " m"]
+    unrest: float
 
     def __init__(
         self,
@@ -48,6 +51,7 @@ class TaskSet:
         activation: float = 1.0,
         name: str = "",
         sigma_reference: ArrayLike = 1.0,
+        unrest: float = 1.0,
     ) -> None:
         who = f"task set {name!r}" if name else "task set"
         J = _array(J, f"{who}: J")
@@ -74,7 +78,11 @@ class TaskSet:
         object.__setattr__(self, "priority", int(priority))
         object.__setattr__(self, "activation", activation)
         object.__setattr__(self, "name", name)
+        unrest = float(unrest)
+        if not 0.0 <= unrest < float("inf"):
+            raise InputError(f"{who}: unrest must be >= 0 and finite, got {unrest}")
         object.__setattr__(self, "sigma_reference", np.broadcast_to(reference, f.shape))
+        object.__setattr__(self, "unrest", unrest)
 
     def replace(self, *, f: ArrayLike | None = None, activation: float | None = None) -> "TaskSet":
         """Copy this task set with another desired value or activation."""
@@ -85,6 +93,7 @@ class TaskSet:
             self.activation if activation is None else activation,
             self.name,
             self.sigma_reference,
+            self.unrest,
         )
 
 

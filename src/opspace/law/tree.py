@@ -3,6 +3,7 @@
 # J, M and R are the paper's matrices, not constants; jaxtyping leaves NumPy's type parameters open.
 # pyright: strict, reportConstantRedefinition=false, reportUnknownMemberType=false
 # pyright: reportUnknownVariableType=false, reportUnknownArgumentType=false
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
@@ -166,7 +167,13 @@ class Walk:
             outcome = LevelOutcome([Alternative(1.0, partial)], spectrum)
         else:
             outcome = solve_level_smoothly(
-                J, f, above, self._buffer, self._moves(above), want_spectrum=self._want_spectra
+                J,
+                f,
+                above,
+                self._buffer,
+                self._moves(above),
+                unrest=math.hypot(*(self._whitened[k].unrest for k in members)),
+                want_spectrum=self._want_spectra,
             )
         known = self.report.levels.get(level.priority)
         if known is None or share > known.weight:

@@ -104,7 +104,9 @@ class CompiledReport(Written):
         plan, found = self.plan, self._found
         shares = found.numbers("share")
         there = {place[0] for place, share in zip(plan.places, shares, strict=True) if share > 0.0}
-        solved = zip(*map(found.numbers, ("scale", "top", "chosen", "width")), strict=True)
+        solved = zip(
+            *map(found.numbers, ("scale", "top", "chosen", "width", "unrest_there")), strict=True
+        )
         next(solved)  # joint limits are no level
         kept = found["kept"]
         return tuple(
@@ -127,6 +129,7 @@ class CompiledReport(Written):
         top: float,
         chosen: float,
         width: float,
+        unrest: float,
     ) -> LevelStatus:
         plan = self.plan
         here = [s for s, place in enumerate(plan.places) if place[0] == level]
@@ -140,5 +143,5 @@ class CompiledReport(Written):
         present = [s for s in here if int(chosen) & slot_bit(s)]
         packed = [plan.packed[plan.places[s][1]] for s in present]
         first, rows = int(plan.first_kept[depth]), sum(p.task.rows for p in packed)
-        directions = plan.spectra.of(kept[first : first + rows, : int(width)])
+        directions = plan.spectra.of(kept[first : first + rows, : int(width)], unrest)
         return LevelStatus(level, tuple(p.task.name for p in packed), *directions, scale)

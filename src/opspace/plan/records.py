@@ -114,6 +114,8 @@ SPACE = RecordTable(
     _work("scale", ("widest",), "scales of reflectors"),
     _work("sigma", ("n",), "singular values"),
     _work("motion", ("n",), "whitened velocity Uᵀ q̇", "√J"),
+    _work("unrest", ("widest",), "how far each row is from rest at its target, squared", start=1.0),
+    _reported("unrest_there", (_DEPTHS,), "how far a level was when `top` was found"),
     _reported("kept", ("slot_rows", "n"), "B of each level when `top` was found"),
     _plan("first_kept", (_DEPTHS,), "row where that begins for each level", dtype=_INT),
     _work("motors", (1,), "whether torque limits are kept", dtype=_INT),
@@ -152,6 +154,7 @@ TICK = RecordTable(
     _tuned("press", ("presses", PRESS_SIZE), "force tasks, see `opspace.law.press_columns`"),
     _work("press_axes", (6, 6), "rows of a force task in world axes"),
     _plan("row_weight", ("rows",), "1/√reference", start=1.0),
+    _plan("row_near", ("rows",), "1/e₀ of `opspace.law.scalars.unrest_of`", "1/m, 1/rad"),
     _plan(
         "variable", ("variables", VARIABLE_SIZE), "an activation in time, as `ramp` takes it", "s"
     ),
@@ -252,6 +255,7 @@ SPECTRUM = RecordTable(
     "The directions of one level, strongest first, as a report gives them.",
     _caller("B", ("here", "free"), "its rows in the basis of the free motions"),
     _caller("option", (OPTION_SIZE,), "options of the controller"),
+    _caller("unrest", (1,), "how far the level is from rest at its target"),
     _work("C", ("fewer", "more"), "B, or its transpose where that has fewer rows"),
     _work("Y", ("fewer", "fewer"), "vectors of the smaller side, as rows"),
     _work("sigma", ("fewer",), "σ"),

@@ -10,6 +10,7 @@ import numpy as np
 
 from opspace.errors import InputError, unknown_name
 from opspace.law import SigmaBuffer
+from opspace.law.scalars import NEAR, NEAR_TURN
 from opspace.plan.calibration import Calibration, Workspace
 from opspace.robots.protocol import Robot
 from opspace.tasks import ForceTask, JointTask, PostureTask, Task
@@ -29,6 +30,12 @@ class Singularity:
     a narrower release fewer reachable targets rest with an error, and an arm that has been stretched
     out comes back later, perhaps not at all.
 
+    A task that rests at its target inside the release would keep an error there, since the levels below
+    pull at it. So where a level is nearly at rest at its targets both buffers lie below: 0.01 to 0.05
+    and 0.01 to 0.03 with the defaults. What is asked for there is small, and so are torques. A level is
+    the nearer to rest the smaller its errors are and the slower the robot is as a whole, see
+    `opspace.law.scalars.unrest_of`; what moves or is far away has the buffers above.
+
     Args:
         lower: σ at and below which a direction is absent.
         upper: σ at and above which a direction is fully active.
@@ -38,9 +45,13 @@ class Singularity:
             below. 1 is the one buffer of the paper, in which directions are released wherever they
             fade, and a task that rests inside it keeps an error.
         damping: Of the joint motion along a direction that answers in part, 1/s; none with release 1.
+        near: How far from its target a task in metres is anything but at rest there, m; one in radians
+            is at 1 rad for each 0.3 m of it. 0 has the same buffers at rest as in motion. None is 0.3,
+            and 0 with release 1 or absolute eigenvalues, as in the paper.
 
     Raises:
-        InputError: Not 0 < lower < upper, not 0 < release <= 1, or a damping below 0.
+        InputError: Not 0 < lower < upper, not 0 < release <= 1, a damping or ``near`` below 0, or a
+            ``near`` above it with one buffer or absolute eigenvalues.
         UnknownNameError: An unknown scale or profile.
     """
 
@@ -50,13 +61,30 @@ class Singularity:
     profile: str = "quintic"
     release: float = 0.4
     damping: float = field(default=10.0, repr=False)
+    near: float | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
         if self.scale not in ("relative", "absolute"):
             raise unknown_name("scale", self.scale, ("relative", "absolute"))
         if not 0.0 < self.release <= 1.0:
             raise InputError(f"release is a part of the buffer, 0 to 1, got {self.release}")
+        if self.near is not None and not 0.0 <= self.near < float("inf"):
+            raise InputError(f"near is a distance, 0 for none, got {self.near}")
+        if self.near and not self._can_rest:
+            raise InputError(
+                "near takes two buffers of relative eigenvalues: release below 1, scale 'relative'"
+            )
         _ = self.buffer
+
+    @property
+    def _can_rest(self) -> bool:
+        return self.release < 1.0 and self.scale == "relative"
+
+    @property
+    def rests_within(self) -> tuple[float, float]:
+        """How near its target a task is at rest, m and rad; 0 where buffers are the same at rest."""
+        near = self.near if self.near is not None else NEAR if self._can_rest else 0.0
+        return near, NEAR_TURN * near / NEAR
 
     @property
     def buffer(self) -> SigmaBuffer:
@@ -137,6 +165,14 @@ class Scales:
     def references(self, tasks: Iterable[Task]) -> list[np.ndarray]:
         """Return `reference` of every task."""
         return [self.reference(task) for task in tasks]
+
+    def near(self, task: Task) -> np.ndarray:
+        """Return 1/e₀ of a task's rows for `unrest_of` of the law, (m,), 0 where never at rest."""
+        if self._option is None or isinstance(task, PostureTask | JointTask):
+            return np.zeros(task.rows)
+        within: dict[str, float] = dict(zip(("m", "rad"), self._option.rests_within, strict=True))
+        found = [within.get(unit, 0.0) for unit in task.error_units]
+        return np.array([1.0 / e if e > 0.0 else 0.0 for e in found])
 
     def calibration(self, tasks: list[Task]) -> Calibration:
         """Return the scales of the robot and of prepared tasks."""

@@ -24,20 +24,31 @@ class Spectra:
         self._made: dict[tuple[int, ...], tuple[Record, Handle]] = {}
         self._lock = Lock()
 
-    def of(self, B: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    def of(
+        self, B: np.ndarray, unrest: float
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Return σ, activations, responses and the directions as columns, strongest first (Eq. 25).
 
         Args:
             B: (rows, free) rows of the level in the basis of the free motions.
+            unrest: How far the level is from rest at its target.
         """
         with self._lock:
             found = self._made.get(B.shape)
             if found is None:
                 sizes = {"fewer": min(B.shape), "more": max(B.shape)}
-                record = SPECTRUM.make(sizes, {"B": np.zeros(B.shape), "option": self._option})
+                record = SPECTRUM.make(
+                    sizes,
+                    {
+                        "B": np.zeros(B.shape),
+                        "option": self._option,
+                        "unrest": np.zeros(1),
+                    },
+                )
                 found = self._made[B.shape] = record, record.handle()
             record, handle = found
             record.B[:] = B
+            record.unrest[0] = unrest
             record.directions.fill(0.0)  # those of no length are left out
             KERNELS["spectrum"](handle.address)
             told = record.sigma, record.activation, record.response, record.directions

@@ -315,5 +315,11 @@ def _singularity(scenario: Scenario) -> Singularity | None:
         return None
     profile = SWITCH if scenario.method == "switch" else option.profile
     return Singularity(
-        option.lower, option.upper, option.scale, profile, option.release, option.damping
+        option.lower,
+        option.upper,
+        option.scale,
+        profile,
+        option.release,
+        option.damping,
+        option.near,
     )
