@@ -59,7 +59,7 @@ class SwiftWay:
     def __init__(self, way: Array, velocity: Array, acceleration: Array, pace: Pace) -> None:
         self._axes = _axes_along(way)
         self._limits = most, jerk = pace.acceleration, pace.acceleration / JERK_TIME
-        self._parts: list[tuple[float, ...]] = []
+        self._parts: list[tuple[float, float, float, float, float]] = []
         self._ends: list[tuple[float, float]] = []
         for d, v, a in (np.stack((way, velocity, acceleration), axis=1).T @ self._axes).T.tolist():
             plan = swift_motion(d, v, a, pace.speed, most, jerk)
