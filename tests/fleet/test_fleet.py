@@ -159,6 +159,71 @@ def test_springs_of_each_robot():
         pose.set_gains(100.0)
 
 
+def ways(robot):
+    """Ways of a place, a turn and joints, which leave each other motions, and of a pose later."""
+    limits = {"max_speed": 0.4, "max_acceleration": 1.5}
+    point = osc.PositionTask(robot.frame_names[-3], axes="xz", name="point", **limits)
+    turn = osc.OrientationTask(axes="yz", axes_frame="tool", name="turn", **limits)
+    down = [0.4, 0.1, 0.2, 0.0, 1.0, 0.0, 0.0]
+    pose = osc.PoseTask(target=down, max_speed=(0.5, 1.0), max_acceleration=(2.0, 4.0), name="pose")
+    return [point, turn, osc.PostureTask(**limits)], pose
+
+
+def test_ways_to_new_targets_of_each_robot():
+    """From rest and on the way, with and without feed-forward, held and found, in and out again."""
+    both = Beside(make=ways, torque_limits="report")
+    both.fleet.insert(both.later, 0, robots=[])
+    rng = np.random.default_rng(21)
+    Q, V = both.states(rng, 0.4, 0.1)
+    poses = [0, 2]
+    for k in range(80):
+        if k in (2, 9, 20, 21, 30):
+            goals = [0.4, 0.1, 0.3] + rng.uniform(-0.2, 0.2, (both.count, 3))
+            turns = rng.normal(size=(both.count, 4))
+            turns /= np.linalg.norm(turns, axis=1, keepdims=True)
+            wholes, joints = np.hstack([goals, turns]), Q + rng.uniform(-0.5, 0.5, Q.shape)
+            told = {"point": goals[:, ::-1], "turn": turns, "posture": joints}
+            some = [i for i in range(both.count) if k != 9 or i % 2]
+            rates = [0.1, 0.0, 0.2] if k == 21 else None  # followed as it is
+            for name, targets in told.items():
+                moving = rates if name == "point" else None
+                both.fleet[name].set_target(targets[some], moving, moving, robots=some)
+                for i in some:
+                    both.stacks[i][name].set_target(targets[i], moving, moving)
+            if k > 15:
+                both.fleet["pose"].set_target(wholes[poses], robots=poses)
+                for i in poses:
+                    both.others[i].target = wholes[i]
+        for when, ask in ((15, "insert"), (40, "remove"), (44, "insert")):
+            if k == when:
+                given = (0, 0.01) if ask == "insert" else (0.01,)
+                getattr(both.fleet, ask)(both.later, *given, robots=poses)
+                for i in poses:
+                    getattr(both.stacks[i], ask)(both.others[i], *given)
+        jump = 5.0 * (k >= 70)  # to the ends of all ways
+        both.assert_same(0.01 * k + jump, Q + 0.01 * k * V, V)
+
+
+def test_a_target_that_is_none_ends_a_way_which_begins_anew_where_the_robot_is():
+    both = Beside(2, make=ways, alone=True, torque_limits="report")
+    point = both.fleet["point"]
+    Q, V = both.states(np.random.default_rng(22), 0.3, 0.0)
+    both.fleet.step(0.0, Q, V)
+    point.set_target([0.3, 0.2, 0.4])
+    both.fleet.step(0.1, Q, V)
+    both.fleet.step(0.2, Q, V)
+    assert (np.abs(point.error.numpy()).max(axis=1) > 1e-3).all(), "both are on their way"
+    fair = point.target.numpy().copy()
+    point.target.assign([[np.nan] * 3, fair[1]])
+    both.fleet.step(0.3, Q, V)
+    assert [bool(s & osc.Status.FAULT) for s in both.fleet.status.numpy()] == [True, False]
+    point.target.assign(fair)
+    both.fleet.step(0.4, Q, V)
+    error = np.abs(point.error.numpy()).max(axis=1)
+    assert error[0] < 1e-9
+    assert error[1] > 1e-2
+
+
 def test_a_robot_that_is_reset_begins_anew_and_no_other_robot_notices():
     both, alone = (Beside(alone=True).prepare() for _ in range(2))
     rng = np.random.default_rng(4)
@@ -211,6 +276,33 @@ def test_single_precision():
     assert lost > 100, "bounds that contradict each other, as well"
 
 
+def led(robot):
+    """The tasks of all these tests, on ways."""
+    stack, later = tasks(robot)
+    for task in stack[1:3]:
+        task.max_speed, task.max_acceleration = 0.5, 2.0
+    return stack, later
+
+
+def test_ways_in_single_precision():
+    double, single = (Beside(200, d, alone=True, make=led) for d in ("float64", "float32"))
+    rng, errors = np.random.default_rng(23), []
+    Q, V = single.states(rng, 0.5, 0.1)
+    for k in range(24):
+        if k in (2, 12):  # from rest, and on the way
+            goals = ([0.4, 0.1, 0.3] + rng.uniform(-0.2, 0.2, (200, 3))).astype(np.float32)
+            for both in (double, single):
+                both.fleet["position"].set_target(goals)
+                both.fleet["orientation"].set_target([0, 1, 0, 0] if k == 2 else [0, 0, 1, 0])
+        q = (Q + np.float32(0.01 * k) * V).astype(np.float32)
+        want = double.fleet.step(0.01 * k, q.astype(float), V.astype(float)).numpy()
+        tau = single.fleet.step(0.01 * k, q, V).numpy()
+        errors.append(np.abs(tau - want).max(axis=1) / np.abs(want).max(axis=1))
+    assert np.median(errors) < 1e-6
+    assert np.quantile(errors, 0.99) < 1e-5
+    assert np.max(errors) < 1e-3
+
+
 def test_times_on_the_device_and_a_place_for_the_torques():
     wp = pytest.importorskip("warp")
     both = Beside(alone=True).prepare()
@@ -252,7 +344,6 @@ REFUSED = {
     "needs a wrench": lambda: osc.ForceTask(name="press"),
     "reference in time": lambda: osc.PositionTask(target=osc.Circle([0.4, 0.0, 0.3], 0.1, 2.0)),
     "activation of its own": lambda: with_activation(osc.PositionTask()),
-    "on a way": lambda: osc.PositionTask(max_speed=0.3, max_acceleration=1.0),
     "observer_time": lambda: osc.JointLimits(observer_time=0.005),
 }
 
@@ -308,7 +399,7 @@ def test_wrong_input_is_refused_by_name():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("make", [tasks, springs, integrals])
+@pytest.mark.parametrize("make", [tasks, springs, integrals, ways])
 def test_nothing_is_read_before_it_is_written(make):
     from opspace.fleet.program import FleetProgram
 

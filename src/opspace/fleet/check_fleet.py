@@ -90,11 +90,6 @@ def check_task(task: Task, *, given: bool) -> TrackingTask:
             f"{what} has an activation of its own, which is Python; write what it would give into "
             f"fleet[{task.name!r}].activation"
         )
-    if task.max_acceleration is not None:
-        raise InputError(
-            f"{what} goes to new targets on a way (max_acceleration), which a fleet does not; move "
-            f"fleet[{task.name!r}].target along one"
-        )
     if callable(task.target):
         raise InputError(
             f"{what} follows a reference in time, which is Python; write its values into "

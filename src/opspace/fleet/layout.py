@@ -33,9 +33,10 @@ EMPTY = (
 """What a tick does not write everywhere and reads as zero there: a fleet stands on nothing, and springs
 have no gains."""
 
-DIGITS = ("dynamics", "later", "bounds")
+DIGITS = ("dynamics", "later", "bounds", "ways")
 """Records that count with sixteen digits in every fleet. Inertias seen from the origin of the world lose
-three where wrists are light, and the multipliers of bounds that contradict each other seven."""
+three where wrists are light, and the multipliers of bounds that contradict each other seven. What a way
+to a target has to make good across itself is a difference of near numbers."""
 
 PLACES = {"real": ("numbers", "fixed"), "double": ("exact", "fixed"), "I": ("integers", "whole")}
 """Where arrays of a type are that a robot has for itself, and those that robots share."""
@@ -71,7 +72,7 @@ class RobotLayout:
         exact = {
             id(array): (field, array)
             for name in DIGITS
-            for field, array in _arrays(getattr(tick, name))
+            for field, array in _arrays(records[name] if name in records else getattr(tick, name))
             if array.dtype == np.float64 and array.size and not _shared(field)
         }
         rest = [pair for key, pair in found.items() if key not in exact]

@@ -6,6 +6,7 @@ import math
 
 from opspace.command import Status
 from opspace.fleet.integral_sums import forget_sum, learn, push
+from opspace.fleet.led_targets import forget_way, lead, look_at_robot
 from opspace.kernels.columns import (
     FIRST_ROW,
     GOAL_ACCELERATION,
@@ -23,9 +24,8 @@ from opspace.kernels.columns import (
     SPRING,
     TURN,
 )
-from opspace.kernels.dynamics import evaluate
 from opspace.kernels.many_states import brake
-from opspace.kernels.motion import P, R, measure, move_joints
+from opspace.kernels.motion import P, R, measure
 from opspace.kernels.task_rows import _quaternion
 from opspace.kernels.tick import tick
 from opspace.tasks.way_round import LARGEST_STEP
@@ -43,6 +43,7 @@ def robot_tick(work, robot):
     """
     _begin(work, robot)
     _find(work, robot)
+    lead(work, robot)
     for i in range(work.kind.shape[0]):
         if work.kind[i, KIND] == MOTION:
             _take_motion(work, robot, i)
@@ -86,6 +87,7 @@ def _begin(work, robot):
         if robot.epoch[i] != robot.seen[i]:
             robot.remembers[i] = 0
             forget_sum(work, robot, i)
+            forget_way(work, robot, i)
             robot.found[i] = robot.holds[i]
             robot.seen[i] = robot.epoch[i]
         work.kind[i, REMEMBERS] = robot.remembers[i]
@@ -101,8 +103,7 @@ def _find(work, robot):
             any_task = True
     if not any_task:
         return
-    evaluate(work.bodies, work.q, work.v, work.dynamics)
-    move_joints(work)
+    look_at_robot(work)
     for i in range(work.kind.shape[0]):
         if robot.found[i] == 0:
             continue

@@ -14,9 +14,10 @@ from opspace.fleet.given_motion import INSTEAD
 from opspace.fleet.integral_sums import WITHOUT
 from opspace.fleet.kernels_in_cpp import translate
 from opspace.fleet.layout import RobotLayout
+from opspace.fleet.led_targets import WITHOUT_WAYS
 from opspace.fleet.one_robot import robot_tick
 from opspace.fleet.precision import constants_of
-from opspace.fleet.robot_record import ROBOT
+from opspace.fleet.robot_record import ROBOT, WAYS
 from opspace.fleet.task_arrays import TaskArrays
 from opspace.fleet.warp_library import warp
 from opspace.kernels.columns import VARIABLE_SIZE
@@ -25,12 +26,22 @@ from opspace.plan.plan import Plan
 START = 2
 """Column of an activation in time that holds when it starts."""
 
+NOW = "(times.shape[0] > 1 ? times.data[i] : times.data[0])"
+"""The time of a robot, s."""
+
+KINDS = {np.float64: "double", np.float32: "float", np.int64: "I"}
+"""Types of numbers in C++."""
+
 LOOP = re.compile(r"^( *)(for \(I )", re.M)
 LAMBDA = re.compile(r"^(static constexpr auto \w+ = \[\]\([^)]*\)) \{$", re.M)
 ROLLED = {"cpu": '_Pragma("clang loop unroll(disable)")', "cuda": '_Pragma("unroll 1")'}
 """Loops stay loops: rolled out they take a compiler many times as long."""
 
-EXACT = tuple(f"opspace.kernels.{name}" for name in ("dynamics", "projection", "room_below"))
+EXACT = (
+    *(f"opspace.kernels.{name}" for name in ("dynamics", "projection", "room_below")),
+    "opspace.law.swift_motion",
+    "opspace.fleet.led_targets",
+)
 """Modules that count with sixteen digits in every fleet, as `opspace.fleet.layout.DIGITS` do."""
 
 OPTIONS = {
@@ -77,8 +88,11 @@ class FleetProgram:
         wp = warp()
         real = getattr(wp, dtype)
         sizes = plan.size.by_name()
-        robot = ROBOT.make({**sizes, "given": sizes["tasks"] if given else 0})
-        layout = RobotLayout(plan.tick, {"robot": robot}, poison=poison)
+        paced = any(task.is_paced for task in arrays)
+        tasks, rows = sizes["tasks"], sizes["rows"]
+        ways = {"ways": tasks if paced else 0, "way_rows": rows if paced else 0}
+        robot = ROBOT.make({**sizes, "given": tasks if given else 0})
+        layout = RobotLayout(plan.tick, {"robot": robot, "ways": WAYS.make(ways)}, poison=poison)
         self._addresses: list[int] = []
         self._first = layout.integers.size
         lines = _lines(plan, arrays, given, self._address)
@@ -87,13 +101,16 @@ class FleetProgram:
             timing = _time_lines(arrays, self._address(ended))
             lines = lines[0] + timing[0], lines[1] + timing[1]
         numbers = layout.numbers
+        if paced:
+            timing = _way_lines(arrays, self._address)
+            lines = lines[0] + timing[0], lines[1] + timing[1]
         if dtype == "float32":
             lines[0].append(
                 f"for (int k = 0; k < {sizes['limits']}; ++k) "
                 f"robot.limit_rest_().p[k] = fixed[{numbers.size} + k];"
             )
             numbers = np.concatenate([numbers, rests_of(plan.tick.limit)])
-        code, name = _translated(dtype, given is not None, integrates)
+        code, name = _translated(dtype, given is not None, integrates, paced)
         text = "\n".join(
             [
                 f"typedef {'double' if dtype == 'float64' else 'float'} real;",
@@ -154,7 +171,7 @@ def _lines(
     for i, (task, packed) in enumerate(zip(arrays, plan.packed, strict=True)):
         told += [(i, *place) for place in task.places(i, packed.rows)]
     for i, way, array, inside in told:
-        kind = "real" if array.dtype is not warp().int64 else "I"
+        kind = KINDS[warp().dtype_to_numpy(array.dtype)]
         size = int(np.prod(array.shape[1:], dtype=int))
         at = f"(({kind}*){address(array)} + (long long)i * {size})"
         if "in" in way:
@@ -168,10 +185,21 @@ def _lines(
 def _time_lines(arrays: list[TaskArrays], ended: str) -> tuple[list[str], list[str]]:
     """Write what integrals need: how long it is since the tick before, and which tasks have none."""
     last = f"((double*){ended})[i]"
-    now = "(times.shape[0] > 1 ? times.data[i] : times.data[0])"
-    before = [f"robot.since_()(0) = real({now} - {last});"]
+    before = [f"robot.since_()(0) = real({NOW} - {last});"]
     before += [f"robot.ki_()({i}) = 0;" for i, task in enumerate(arrays) if not task.integrates]
-    return before, [f"{last} = {now};"]
+    return before, [f"{last} = {NOW};"]
+
+
+def _way_lines(arrays: list[TaskArrays], address: Any) -> tuple[list[str], list[str]]:
+    """Write what ways need: their limits, and how long it is since each began."""
+    before, after = [], []
+    for i, task in enumerate(arrays):
+        before += [f"work.ways_().pace_()({i}, {k}) = {x!r};" for k, x in enumerate(task.paces)]
+        if task.is_paced:
+            begun = f"((double*){address(task.begun)})[i]"
+            before.append(f"work.ways_().age_()({i}) = {NOW} - {begun};")
+            after.append(f"if (work.ways_().begins_()({i})) {begun} = {NOW};")
+    return before, after
 
 
 def _for_compiler(text: str, kind: str) -> str:
@@ -187,8 +215,10 @@ def _row(array: str) -> str:
 
 
 @cache
-def _translated(dtype: str, given: bool, integrates: bool) -> tuple[str, str]:
+def _translated(dtype: str, given: bool, integrates: bool, paced: bool) -> tuple[str, str]:
     instead = {**(INSTEAD if given else {}), **({} if integrates else WITHOUT)}
+    if not paced:
+        instead |= WITHOUT_WAYS
     if dtype == "float32":
         instead |= EXACTLY
     return translate(robot_tick, constants_of(dtype), instead, EXACT)

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from opspace.errors import InputError
+from opspace.fleet.led_targets import TOLD_SIZE, WAY_SIZE
 from opspace.fleet.warp_library import robots_of, warp
 from opspace.kernels.columns import (
     GOAL_ACCELERATION,
@@ -57,6 +58,8 @@ class TaskArrays:
         stiffness: (m,) K, N/m, N·m/rad.
         damping_ratio: ζ, 1 is critical.
         force: (m,) force on the environment beside the spring's, N, N·m.
+        is_paced: Whether it goes to new targets on ways: a task with a ``max_acceleration``.
+        begun: When the way of each robot began, s.
         told_motion: Whether it is told the three that follow: a task of motion in a fleet that is given
             the dynamics.
         pose: (7,) position and quaternion wxyz of what the task controls.
@@ -71,7 +74,7 @@ class TaskArrays:
         self._size = 0
         self._joints = False
         self.told_motion = False
-        self.is_spring = self.integrates = False
+        self.is_spring = self.integrates = self.is_paced = False
         self._start = 0
         self._wishes = np.full(count, task.target is None)
 
@@ -114,6 +117,10 @@ class TaskArrays:
                 self.pose = self._filled(np.eye(7)[3])
                 self.jacobian = self._filled(np.zeros((6, tick.v.size)))
                 self.drift = self._filled(np.zeros(6))
+        if self.task.max_acceleration is not None and self.task.target is not None:
+            target = self._rows(self.task.target, 1)[
+                0
+            ]  # the plan has what is followed, at its start
         self.target, self.velocity, self.acceleration = map(
             self._filled, (target, velocity, acceleration)
         )
@@ -128,10 +135,23 @@ class TaskArrays:
         self.error = self._filled(np.zeros(m))
         self._turn, self._before = self._filled(np.zeros(4)), self._filled(np.zeros(4))
         self._joint_before = self._filled(np.zeros(m))
+        if self.task.max_acceleration is not None:
+            self._begin_ways(m)
         self._remembers, self._seen = self._filled(0), self._filled(-1)
         self._epoch = self._filled(0)
         self._holds = self._filled(0)
         self._holds.assign(self._wishes.astype(np.int64))
+
+    def _begin_ways(self, rows: int) -> None:
+        """Make what a task that goes on ways remembers of them."""
+        wp = warp()
+        self.is_paced = True
+        self._known, self._led = self._filled(0), self._filled(0)
+        nothing = np.zeros((rows, 3)) if self._joints else np.eye(TOLD_SIZE)[3]  # a turn by nothing
+        self._told = self._filled(nothing, wp.float64)
+        self._way = self._filled(np.zeros((rows if self._joints else 6, WAY_SIZE)), wp.float64)
+        self._turned = self._filled(np.eye(4)[0], wp.float64)
+        self.begun = wp.zeros(self._count, dtype=wp.float64, device=self._device)
 
     def __repr__(self) -> str:
         return f"TaskArrays({self.name!r} of {self._count} robots on {self._device})"
@@ -211,6 +231,8 @@ class TaskArrays:
             yield "in", self.ki, f"(robot.ki_().p + {i})"
             yield "in", self.max_integral, f"(robot.max_integral_().p + {i})"
             yield "in, out", self.integral, f"(robot.{place})"
+        if self.is_paced:
+            yield from self._ways(i, first)
         if self.is_spring:
             yield "in", self.stiffness, f"(robot.stiffness_().p + {first})"
             yield "in", self.force, f"(robot.spring_force_().p + {first})"
@@ -231,17 +253,38 @@ class TaskArrays:
         else:
             yield "in, out", self._before, f"(robot.before_().p + {4 * i})"
 
-    def _filled(self, row: ArrayLike) -> Any:
-        """Make an array with the same row for every robot."""
+    @property
+    def paces(self) -> list[float]:
+        """Speed and acceleration of the task's ways, those of a turn after those of a position; or 0."""
+        task = self.task
+        if not self.is_paced:
+            return [0.0] * 4
+        speeds, accelerations = np.atleast_1d(task.max_speed), np.atleast_1d(task.max_acceleration)
+        return np.resize(np.stack((speeds, accelerations), axis=1), 4).tolist()
+
+    def _ways(self, i: int, first: int) -> Iterator[tuple[str, Any, str]]:
+        """List what a task with a ``max_acceleration`` remembers of its ways."""
+        yield "in, out", self._known, f"(work.ways_().known_().p + {i})"
+        yield "in, out", self._led, f"(work.ways_().led_().p + {i})"
+        if self._joints:
+            yield "in, out", self._told, f"(work.ways_().joint_told_().p + {3 * first})"
+            yield "in, out", self._way, f"(work.ways_().joint_parts_().p + {WAY_SIZE * first})"
+        else:
+            yield "in, out", self._told, f"(work.ways_().told_().p + {TOLD_SIZE * i})"
+            yield "in, out", self._way, f"(work.ways_().parts_().p + {6 * WAY_SIZE * i})"
+            yield "in, out", self._turned, f"(work.ways_().turned_().p + {4 * i})"
+
+    def _filled(self, row: ArrayLike, real: Any = None) -> Any:
+        """Make an array with the same row for every robot, of the fleet's numbers or of others."""
         wp = warp()
         found = np.asarray(row)
         whole = np.broadcast_to(found, (self._count, *found.shape))
-        dtype = wp.int64 if found.dtype.kind == "i" else self._dtype
+        dtype = wp.int64 if found.dtype.kind == "i" else real or self._dtype
         return wp.array(whole, dtype=dtype, device=self._device)
 
     def _rows(self, value: ArrayLike, count: int) -> np.ndarray:
         found = numbers(value, f"task {self.name!r}: target")
-        if found.shape == (count, self._size) and found.shape != (3, 3):
+        if found.shape == (count, self._size):
             turn = found[:, 3 - self._start :] if self._size != 3 and not self._joints else None
             lengths = np.ones(1) if turn is None else np.linalg.norm(turn, axis=1)
             if not np.isfinite(found).all() or not (abs(lengths - 1.0) < 1e-3).all():

@@ -84,7 +84,7 @@ def part_that_reaches(
             middle = q - g * (q - p) / (g - f)
         if not (min(p, q) < middle < max(p, q)):
             middle = 0.5 * (p + q)
-        if middle in (p, q):
+        if not (min(p, q) < middle < max(p, q)):
             break
         h = far_with(middle if pushed else a, 0.0 if pushed else middle, v, a, most, jerk) - d
         if (h > 0.0) != (g > 0.0):
