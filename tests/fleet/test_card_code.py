@@ -7,7 +7,6 @@ import pytest
 
 import opspace as osc
 from opspace.fleet.card_code import card_code
-from opspace.fleet.check_fleet import MOST_MEMORY, check_memory
 from opspace.fleet.cubin import needs_of
 
 wp = pytest.importorskip("warp", reason="fleets run in Warp: pip install 'opspace[gpu]'")
@@ -40,14 +39,6 @@ def test_local_memory_is_what_each_thread_keeps(tmp_path):
     for needs in (few, many):
         assert 0 < needs.registers <= 255
         assert needs.instructions > 0
-
-
-def test_robots_that_no_thread_of_a_card_has_room_for_are_refused_by_name():
-    check_memory("arm", MOST_MEMORY)
-    with pytest.raises(
-        osc.InputError, match=rf"'talos' .* {MOST_MEMORY + 8} B, .* {MOST_MEMORY} B"
-    ):
-        check_memory("talos", MOST_MEMORY + 8)
 
 
 def test_a_card_that_warp_does_not_know_is_refused_by_name():

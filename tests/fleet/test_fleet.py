@@ -398,23 +398,54 @@ def test_wrong_input_is_refused_by_name():
         osc.Fleet(both.robot, osc.Stack([osc.PostureTask()]), 0, device="cpu")
 
 
+def with_program(both, **options):
+    """Let a fleet that has made a step go on with a program of its own."""
+    from opspace.fleet.program import FleetProgram
+
+    fleet = both.fleet
+    plan = fleet._controller.plan_apart(fleet._roster.present)
+    fleet._program = FleetProgram(
+        plan, list(fleet), fleet.dtype, fleet.device, "cpu", ended=fleet._ended, **options
+    )
+    return fleet
+
+
+@pytest.mark.parametrize("dtype", ["float64", "float32"])
+def test_a_workspace_changes_no_bit(dtype):
+    """Numbers of 32 robots side by side, as on a card, and a part that is not full."""
+    local, spread = (Beside(40, dtype, alone=True, make=led) for _ in range(2))
+    rng = np.random.default_rng(15)
+    Q, V = local.states(rng)
+    local.fleet.step(0.0, Q, V), spread.fleet.step(0.0, Q, V)
+    fleet = with_program(spread, lanes=32)
+    assert fleet._program.workspace.size * 8 == 64 * fleet._program.memory
+    for k in range(6):
+        Q, V = local.states(rng, spread=0.5 * k, speed=2.0)
+        local.fleet["position"].set_target(Q[0, :3])
+        fleet["position"].set_target(Q[0, :3])
+        want = local.fleet.step(0.01 * k, Q, V).numpy()
+        np.testing.assert_array_equal(fleet.step(0.01 * k, Q, V).numpy(), want)
+        np.testing.assert_array_equal(fleet.status.numpy(), local.fleet.status.numpy())
+
+
+def test_a_workspace_that_a_device_has_no_room_for_is_refused_by_name():
+    from opspace.fleet.warp_library import device_of, workspace_of
+
+    with pytest.raises(osc.InputError, match=r"1000000000 of these robots .* MiB, which cpu"):
+        workspace_of(10**9, 10**6, 32, device_of("cpu"))
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("make", [tasks, springs, integrals, ways])
 def test_nothing_is_read_before_it_is_written(make):
-    from opspace.fleet.program import FleetProgram
-
     clean, poisoned = (Beside(64, alone=True, make=make) for _ in range(2))
     if make is tasks:
         clean.prepare()
         poisoned.prepare()
-    fleet, rng = poisoned.fleet, np.random.default_rng(9)
+    rng = np.random.default_rng(9)
     Q, V = clean.states(rng)
-    clean.fleet.step(0.0, Q, V), fleet.step(0.0, Q, V)
-    arrays = list(fleet)
-    plan = fleet._controller.plan_apart(fleet._roster.present)
-    fleet._program = FleetProgram(
-        plan, arrays, fleet.dtype, fleet.device, "cpu", ended=fleet._ended, poison=True
-    )
+    clean.fleet.step(0.0, Q, V), poisoned.fleet.step(0.0, Q, V)
+    fleet = with_program(poisoned, poison=True)
     for k in range(8):
         Q, V = clean.states(rng, spread=0.4 * k, speed=2.0)
         tau = fleet.step(0.001 * k, Q, V).numpy()

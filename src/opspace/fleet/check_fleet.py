@@ -30,25 +30,6 @@ def check_robot(controller: Controller) -> None:
 
 
 DYNAMICS = ("own", "given")
-MOST_MEMORY = 512 * 1024
-"""Bytes of local memory that CUDA gives a thread at most."""
-
-
-def check_memory(robot: str, memory: int) -> None:
-    """Check that a thread of a graphics card has room for what a robot works in.
-
-    Args:
-        robot: Name of the robot.
-        memory: Bytes that each robot has for itself.
-
-    Raises:
-        InputError: It has not.
-    """
-    if memory > MOST_MEMORY:
-        raise InputError(
-            f"each {robot!r} of this fleet works in {memory} B, and a thread of a graphics card has "
-            f"{MOST_MEMORY} B; give the stack fewer rows and levels, or the fleet device='cpu'"
-        )
 
 
 def check_dynamics(dynamics: str, period: float | None) -> bool:

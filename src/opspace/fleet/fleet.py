@@ -9,7 +9,7 @@ import numpy as np
 
 from opspace.controller import Controller
 from opspace.errors import InputError
-from opspace.fleet.check_fleet import check_dynamics, check_memory, check_robot, check_task
+from opspace.fleet.check_fleet import check_dynamics, check_robot, check_task
 from opspace.fleet.precision import dtype_name
 from opspace.fleet.program import FleetProgram
 from opspace.fleet.roster import Roster
@@ -369,8 +369,6 @@ class Fleet:
         self._ramps = wp.array(roster.ramps(plan.variables), dtype=wp.float64, device=self.device)
         self._plan = plan
         self._program = self.program_for("cpu" if self.device.is_cpu else "cuda")
-        if not self.device.is_cpu:
-            check_memory(self.robot.name, self._program.memory)
 
     def _zeros(self, shape: tuple[int, ...]) -> Any:
         return warp().zeros(shape, dtype=self._real, device=self.device)

@@ -13,18 +13,26 @@ from opspace.fleet.fleet_kernel import fleet_kernel
 from opspace.fleet.given_motion import INSTEAD
 from opspace.fleet.integral_sums import WITHOUT
 from opspace.fleet.kernels_in_cpp import translate
-from opspace.fleet.layout import RobotLayout
+from opspace.fleet.layout import LANES, RobotLayout
 from opspace.fleet.led_targets import WITHOUT_WAYS
 from opspace.fleet.one_robot import robot_tick
 from opspace.fleet.precision import constants_of
 from opspace.fleet.robot_record import ROBOT, WAYS
 from opspace.fleet.task_arrays import TaskArrays
-from opspace.fleet.warp_library import warp
+from opspace.fleet.warp_library import warp, workspace_of
 from opspace.kernels.columns import VARIABLE_SIZE
 from opspace.plan.plan import Plan
 
 START = 2
 """Column of an activation in time that holds when it starts."""
+
+MOST_LOCAL = 128 * 1024
+"""Bytes that a robot may work in as local memory of its thread; with more it works in a workspace.
+Local memory is laid out on a card for all threads that it can run at once, however few robots there are
+(on an H100 for 270 336), and no thread has more than 512 KiB."""
+
+LANES_OF = {"cpu": 1, "cuda": LANES}
+"""Robots that share a part of a workspace: on a processor the numbers of one lie together."""
 
 NOW = "(times.shape[0] > 1 ? times.data[i] : times.data[0])"
 """The time of a robot, s."""
@@ -63,6 +71,7 @@ class FleetProgram:
         kind: What the kernel is for, ``"cpu"`` or ``"cuda"``.
         given: Inertia and bias of every robot if dynamics are given, M and bias.
         ended: (count,) of float64, when the last tick of every robot was, s.
+        lanes: How many robots share a part of a workspace; None lets the size of one robot decide.
         poison: Begin all memory as numbers that are none, so that whatever is read before it is
             written shows.
 
@@ -71,6 +80,8 @@ class FleetProgram:
         whole: Whole numbers that they share, and where the arrays of the tasks are.
         kernel: The kernel of Warp.
         memory: Bytes of the arrays that each robot has for itself.
+        workspace: Where they are if they are more than `MOST_LOCAL`, for all robots; None if they are
+            local memory of the threads.
     """
 
     def __init__(
@@ -83,6 +94,7 @@ class FleetProgram:
         *,
         ended: Any,
         given: tuple[Any, Any] | None = None,
+        lanes: int | None = None,
         poison: bool = False,
     ) -> None:
         wp = warp()
@@ -92,9 +104,18 @@ class FleetProgram:
         tasks, rows = sizes["tasks"], sizes["rows"]
         ways = {"ways": tasks if paced else 0, "way_rows": rows if paced else 0}
         robot = ROBOT.make({**sizes, "given": tasks if given else 0})
-        layout = RobotLayout(plan.tick, {"robot": robot, "ways": WAYS.make(ways)}, poison=poison)
+        records = {"robot": robot, "ways": WAYS.make(ways)}
+        layout = RobotLayout(plan.tick, records, poison=poison, lanes=lanes)
+        self.memory = layout.memory_of(np.dtype(dtype).itemsize)
+        if lanes is None and self.memory > MOST_LOCAL:
+            lanes = LANES_OF[kind]
+            layout = RobotLayout(plan.tick, records, poison=poison, lanes=lanes)
         self._addresses: list[int] = []
         self._first = layout.integers.size
+        self.workspace, place = None, ""
+        if lanes is not None:
+            self.workspace = workspace_of(ended.shape[0], self.memory, lanes, device)
+            place = self._address(self.workspace)
         lines = _lines(plan, arrays, given, self._address)
         integrates = any(task.integrates for task in arrays)
         if integrates:
@@ -107,7 +128,7 @@ class FleetProgram:
         if dtype == "float32":
             lines[0].append(
                 f"for (int k = 0; k < {sizes['limits']}; ++k) "
-                f"robot.limit_rest_().p[k] = fixed[{numbers.size} + k];"
+                f"robot.limit_rest_().at(k) = fixed[{numbers.size} + k];"
             )
             numbers = np.concatenate([numbers, rests_of(plan.tick.limit)])
         code, name = _translated(dtype, given is not None, integrates, paced)
@@ -118,7 +139,7 @@ class FleetProgram:
                 "const real* fixed = fixed_.data; const I* whole = (const I*)whole_.data;",
                 layout.types(),
                 code,
-                layout.definitions(),
+                layout.definitions(place),
                 *lines[0],
                 f"{name}(work, robot);",
                 *lines[1],
@@ -126,7 +147,6 @@ class FleetProgram:
             ]
         )
         self.kernel = fleet_kernel(_for_compiler(text, kind), dtype, OPTIONS[kind])
-        self.memory = layout.memory_of(np.dtype(dtype).itemsize)
         self.fixed = wp.array(numbers, dtype=real, device=device)
         whole = np.concatenate([layout.integers, np.array(self._addresses, np.int64)])
         self.whole = wp.array(whole, dtype=wp.int64, device=device)
@@ -154,31 +174,33 @@ def _lines(
     before.append(
         f"{{ const double now = times.shape[0] > 1 ? times.data[i] : times.data[0]; "
         f"const double* from = {start}; "
-        f"for (int k = 0; k < {variables * VARIABLE_SIZE}; ++k) work.variable_().p[k] = "
+        f"for (int k = 0; k < {variables * VARIABLE_SIZE}; ++k) work.variable_().at(k) = "
         f"real(k % {VARIABLE_SIZE} == {START} ? from[k] - now : from[k]); }}"
     )
     groups = f"groups.data + (long long)i * {variables}"
-    before.append(f"for (int k = 0; k < {variables}; ++k) work.group_().p[k] = ({groups})[k];")
-    after.append(f"for (int k = 0; k < {variables}; ++k) ({groups})[k] = work.group_().p[k];")
+    before.append(f"for (int k = 0; k < {variables}; ++k) work.group_().at(k) = ({groups})[k];")
+    after.append(f"for (int k = 0; k < {variables}; ++k) ({groups})[k] = work.group_().at(k);")
     after.append("status.data[i] = robot.status_()(0); solves.data[i] = robot.solves_()(0);")
     after.append(
         f"for (int k = 0; k < {limits}; ++k) limits.data[(long long)i * {limits} + k] = "
-        "work.limit_h_().p[k];"
+        "work.limit_h_().at(k);"
     )
     told = [
-        (0, "in", x, f"work.{k}_().p") for k, x in zip(("M", "bias"), given or (), strict=False)
+        (0, "in", x, f"work.{k}_()", 0) for k, x in zip(("M", "bias"), given or (), strict=False)
     ]
     for i, (task, packed) in enumerate(zip(arrays, plan.packed, strict=True)):
         told += [(i, *place) for place in task.places(i, packed.rows)]
-    for i, way, array, inside in told:
+    for i, way, array, inside, first in told:
         kind = KINDS[warp().dtype_to_numpy(array.dtype)]
         size = int(np.prod(array.shape[1:], dtype=int))
         at = f"(({kind}*){address(array)} + (long long)i * {size})"
         if "in" in way:
-            before.append(f"for (int k = 0; k < {size}; ++k) {inside}[k] = {at}[k];")
+            before.append(f"for (int k = 0; k < {size}; ++k) {inside}.at({first} + k) = {at}[k];")
         if "out" in way:
             guard = f"if (robot.found_()({i})) " if way == "in, out where found" else ""
-            after.append(f"{guard}for (int k = 0; k < {size}; ++k) {at}[k] = {inside}[k];")
+            after.append(
+                f"{guard}for (int k = 0; k < {size}; ++k) {at}[k] = {inside}.at({first} + k);"
+            )
     return before, after
 
 

@@ -212,46 +212,46 @@ class TaskArrays:
         _write(self.kp, stiffness, mask)
         _write(self.kv, damping, mask)
 
-    def places(self, i: int, rows: slice) -> Iterator[tuple[str, Any, str]]:
-        """List the arrays, which way each goes, and where it is in the memory of one robot's tick."""
+    def places(self, i: int, rows: slice) -> Iterator[tuple[str, Any, str, int]]:
+        """List the arrays, which way each goes, and where it is: in which array of one robot's tick."""
         first = rows.start
         for name in ("target", "velocity", "acceleration"):
             width = 7 if name == "target" else 6
             start = self._start if name == "target" else 0
-            place = f"robot.{name}_().p + {i * width + start}"
+            place = f"robot.{name}_()", i * width + start
             if self._joints:
-                place = f"robot.joint_{name}_().p + {first}"
+                place = f"robot.joint_{name}_()", first
             way = "in, out where found" if name == "target" else "in"
-            yield way, getattr(self, name), f"({place})"
+            yield way, getattr(self, name), *place
         for name in ("pose", "jacobian", "drift") if self.told_motion else ():
             array = getattr(self, name)
-            yield "in", array, f"(robot.{name}_().p + {i * int(np.prod(array.shape[1:]))})"
+            yield "in", array, f"robot.{name}_()", i * int(np.prod(array.shape[1:]))
         if self.integrates:
-            place = f"joint_integral_().p + {first}" if self._joints else f"integral_().p + {6 * i}"
-            yield "in", self.ki, f"(robot.ki_().p + {i})"
-            yield "in", self.max_integral, f"(robot.max_integral_().p + {i})"
-            yield "in, out", self.integral, f"(robot.{place})"
+            place = ("joint_integral", first) if self._joints else ("integral", 6 * i)
+            yield "in", self.ki, "robot.ki_()", i
+            yield "in", self.max_integral, "robot.max_integral_()", i
+            yield "in, out", self.integral, f"robot.{place[0]}_()", place[1]
         if self.is_paced:
             yield from self._ways(i, first)
         if self.is_spring:
-            yield "in", self.stiffness, f"(robot.stiffness_().p + {first})"
-            yield "in", self.force, f"(robot.spring_force_().p + {first})"
-            yield "in", self.damping_ratio, f"(robot.damping_ratio_().p + {i})"
+            yield "in", self.stiffness, "robot.stiffness_()", first
+            yield "in", self.force, "robot.spring_force_()", first
+            yield "in", self.damping_ratio, "robot.damping_ratio_()", i
         else:
-            yield "in", self.kp, f"(work.kp_().p + {first})"
-            yield "in", self.kv, f"(work.kv_().p + {first})"
-        yield "in", self.activation, f"(work.own_().p + {i})"
-        yield "out", self.presence, f"(work.h_().p + {i})"
-        yield "out", self.error, f"(work.error_().p + {first})"
-        yield "in", self._epoch, f"(robot.epoch_().p + {i})"
-        yield "in", self._holds, f"(robot.holds_().p + {i})"
-        yield "in, out", self._seen, f"(robot.seen_().p + {i})"
-        yield "in, out", self._remembers, f"(robot.remembers_().p + {i})"
-        yield "in, out", self._turn, f"(robot.turn_().p + {4 * i})"
+            yield "in", self.kp, "work.kp_()", first
+            yield "in", self.kv, "work.kv_()", first
+        yield "in", self.activation, "work.own_()", i
+        yield "out", self.presence, "work.h_()", i
+        yield "out", self.error, "work.error_()", first
+        yield "in", self._epoch, "robot.epoch_()", i
+        yield "in", self._holds, "robot.holds_()", i
+        yield "in, out", self._seen, "robot.seen_()", i
+        yield "in, out", self._remembers, "robot.remembers_()", i
+        yield "in, out", self._turn, "robot.turn_()", 4 * i
         if self._joints:
-            yield "in, out", self._joint_before, f"(robot.joint_before_().p + {first})"
+            yield "in, out", self._joint_before, "robot.joint_before_()", first
         else:
-            yield "in, out", self._before, f"(robot.before_().p + {4 * i})"
+            yield "in, out", self._before, "robot.before_()", 4 * i
 
     @property
     def paces(self) -> list[float]:
@@ -262,17 +262,17 @@ class TaskArrays:
         speeds, accelerations = np.atleast_1d(task.max_speed), np.atleast_1d(task.max_acceleration)
         return np.resize(np.stack((speeds, accelerations), axis=1), 4).tolist()
 
-    def _ways(self, i: int, first: int) -> Iterator[tuple[str, Any, str]]:
+    def _ways(self, i: int, first: int) -> Iterator[tuple[str, Any, str, int]]:
         """List what a task with a ``max_acceleration`` remembers of its ways."""
-        yield "in, out", self._known, f"(work.ways_().known_().p + {i})"
-        yield "in, out", self._led, f"(work.ways_().led_().p + {i})"
+        yield "in, out", self._known, "work.ways_().known_()", i
+        yield "in, out", self._led, "work.ways_().led_()", i
         if self._joints:
-            yield "in, out", self._told, f"(work.ways_().joint_told_().p + {3 * first})"
-            yield "in, out", self._way, f"(work.ways_().joint_parts_().p + {WAY_SIZE * first})"
+            yield "in, out", self._told, "work.ways_().joint_told_()", 3 * first
+            yield "in, out", self._way, "work.ways_().joint_parts_()", WAY_SIZE * first
         else:
-            yield "in, out", self._told, f"(work.ways_().told_().p + {TOLD_SIZE * i})"
-            yield "in, out", self._way, f"(work.ways_().parts_().p + {6 * WAY_SIZE * i})"
-            yield "in, out", self._turned, f"(work.ways_().turned_().p + {4 * i})"
+            yield "in, out", self._told, "work.ways_().told_()", TOLD_SIZE * i
+            yield "in, out", self._way, "work.ways_().parts_()", 6 * WAY_SIZE * i
+            yield "in, out", self._turned, "work.ways_().turned_()", 4 * i
 
     def _filled(self, row: ArrayLike, real: Any = None) -> Any:
         """Make an array with the same row for every robot, of the fleet's numbers or of others."""
