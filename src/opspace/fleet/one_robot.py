@@ -17,13 +17,16 @@ from opspace.kernels.columns import (
     KIND,
     MOTION,
     POSITION,
+    PROFILE,
     QUANTITY,
+    RAMP,
     REMEMBERS,
     ROWS,
     SOLVE,
     SPRING,
     TURN,
 )
+from opspace.kernels.compiled_scalars import ramp
 from opspace.kernels.many_states import brake
 from opspace.kernels.motion import P, R, measure
 from opspace.kernels.task_rows import _quaternion
@@ -52,8 +55,11 @@ def robot_tick(work, robot):
         elif work.kind[i, KIND] == JOINTS:
             _take_joints(work, robot, i)
     push(work, robot)
+    for i in range(work.kind.shape[0]):
+        if _absent(work, i):
+            _rest(work, i)
     answer = tick(0.0, work)
-    if answer < 0 or not _gains_usable(work, robot):
+    if answer < 0 or not _gains_usable(work, robot) or not _wishes_usable(work):
         brake(work, work.tau)
         robot.status[0], robot.solves[0] = FAULT, 0
     else:
@@ -63,6 +69,36 @@ def robot_tick(work, robot):
         robot.remembers[i] = work.kind[i, REMEMBERS]
         for c in range(4):
             robot.turn[i, c] = work.numbers[i, TURN + c]
+
+
+def _absent(work, i):
+    """Whether task i is not in this robot's stack, so that nothing about it matters."""
+    x = work.variable[i]
+    value = ramp(0.0, int(x[PROFILE]), x[1], x[2], x[3], x[4], x[5], x[6], x[7], x[8])
+    return x[RAMP] == 0.0 and value == 0.0
+
+
+def _rest(work, i):
+    """Let task i ask for something that is finite."""
+    number = work.numbers[i]
+    for c in range(GOAL_ROTATION, GOAL_ACCELERATION + 6):
+        if not math.isfinite(number[c]):
+            number[c] = 0.0
+    for row in range(work.kind[i, FIRST_ROW], work.kind[i, FIRST_ROW] + work.kind[i, ROWS]):
+        for c in range(3):
+            if not math.isfinite(work.goal[row, c]):
+                work.goal[row, c] = 0.0
+
+
+def _wishes_usable(work):
+    """Whether all that tasks ask for is finite; where nothing is left to them, no torque shows that."""
+    for i in range(work.kind.shape[0]):
+        if _absent(work, i):
+            continue
+        for row in range(work.kind[i, FIRST_ROW], work.kind[i, FIRST_ROW] + work.kind[i, ROWS]):
+            if not math.isfinite(work.fw[row]):
+                return False
+    return True
 
 
 def _gains_usable(work, robot):

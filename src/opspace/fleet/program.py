@@ -26,10 +26,14 @@ from opspace.plan.plan import Plan
 START = 2
 """Column of an activation in time that holds when it starts."""
 
-MOST_LOCAL = 128 * 1024
+MOST_LOCAL = {"cpu": 4 * 1024 * 1024, "cuda": 128 * 1024}
 """Bytes that a robot may work in as local memory of its thread; with more it works in a workspace.
-Local memory is laid out on a card for all threads that it can run at once, however few robots there are
-(on an H100 for 270 336), and no thread has more than 512 KiB."""
+On a processor that is the stack, which all robots use one after the other. A card lays local memory out
+for all threads that it can run at once, however few robots there are (on an H100 for 270 336), and no
+thread has more than 512 KiB. A workspace is as large as the fleet. The code is the same, and so is every
+bit: only how far apart the numbers of one robot are is another number in it. Tiles, a block of threads
+for each robot, would have more of a card at work where robots are few, and would be another source of
+everything that is in `opspace.kernels`."""
 
 LANES_OF = {"cpu": 1, "cuda": LANES}
 """Robots that share a part of a workspace: on a processor the numbers of one lie together."""
@@ -107,7 +111,7 @@ class FleetProgram:
         records = {"robot": robot, "ways": WAYS.make(ways)}
         layout = RobotLayout(plan.tick, records, poison=poison, lanes=lanes)
         self.memory = layout.memory_of(np.dtype(dtype).itemsize)
-        if lanes is None and self.memory > MOST_LOCAL:
+        if lanes is None and self.memory > MOST_LOCAL[kind]:
             lanes = LANES_OF[kind]
             layout = RobotLayout(plan.tick, records, poison=poison, lanes=lanes)
         self._addresses: list[int] = []
