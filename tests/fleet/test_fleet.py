@@ -224,6 +224,121 @@ def test_a_target_that_is_none_ends_a_way_which_begins_anew_where_the_robot_is()
     assert error[1] > 1e-2
 
 
+def presses(robot):
+    """A force along an axis with a moment that turns the tool onto what it touches, above motions."""
+    press = osc.ForceTask(
+        force=12.0, moment_axes="xy", kp=0.2, max_integral=4.0, approach_speed=0.1, name="press"
+    )
+    slide = osc.PositionTask(axes="xy", axes_frame="tool", name="slide")
+    return [osc.JointLimits(), press, slide, osc.PostureTask()], osc.ForceTask(
+        robot.frame_names[-3],
+        [5.0, 3.0],
+        axes="xz",
+        axes_frame="world",
+        friction=False,
+        name="late",
+    )
+
+
+def told_wrenches(both, given):
+    """Tell all robots wrenches, or that there is nothing new, by name."""
+    for name, (wrench, fresh) in given.items():
+        both.fleet[name].wrench.assign(wrench)
+        both.fleet[name].fresh.assign(fresh.astype(np.int64))
+    return [
+        {
+            both.fleet[name].task.sensor: wrench[i] if fresh[i] else None
+            for name, (wrench, fresh) in given.items()
+        }
+        for i in range(both.count)
+    ]
+
+
+def test_forces_of_each_robot():
+    """In the air, in contact, lost, late wrenches, another force, in and out again."""
+    both = Beside(make=presses, torque_limits="report")
+    both.fleet.insert(both.later, 0, robots=[])
+    with pytest.raises(osc.InputError, match="'late' has its arrays from the next step on"):
+        both.fleet["late"].wrench.zero_()
+    rng = np.random.default_rng(31)
+    Q, V = both.states(rng, 0.3, 0.05)
+    both.fleet.step(-1.0, Q, V)
+    both.fleet.reset()
+    seen, sure = 0, 0.0
+    for k in range(90):
+        for when, ask in ((20, "insert"), (50, "remove"), (60, "insert")):
+            if k == when:
+                given = (0, 0.01) if ask == "insert" else (0.01,)
+                getattr(both.fleet, ask)(both.later, *given, robots=[0, 2])
+                for i in (0, 2):
+                    getattr(both.stacks[i], ask)(both.others[i], *given)
+        if k == 30:
+            both.fleet["press"].set_force([20.0, 0.1, 0.0], robots=[1])
+            both.stacks[1]["press"].force, both.stacks[1]["press"].moment = 20.0, [0.1, 0.0]
+        touch = 0.0 if k < 10 or 70 < k < 80 else 9.0
+        q, t = Q + 0.002 * k * V, 0.002 * k
+        press = touch * rng.uniform(-0.1, 0.1, (both.count, 6))
+        for i in range(both.count):
+            both.robot.update(q[i], V[i])
+            press[i, :3] += touch * both.robot.rotation(both.robot.tool)[:, 2]
+        fresh = rng.random(both.count) < 0.7
+        fresh[:] |= k == 0
+        fresh[4] &= not 40 < k < 60  # for so long that it is stale
+        given = {"press": (press, fresh), "late": (0.5 * press, np.ones(both.count, bool))}
+        wrenches = told_wrenches(both, given)
+        tau = both.fleet.step(t, q, V).numpy()
+        for i, controller in enumerate(both.controllers):
+            command = controller.step(t, q[i], V[i], wrenches=wrenches[i])
+            scale = max(1.0, float(np.abs(command.tau).max()))
+            np.testing.assert_allclose(tau[i], command.tau, rtol=0, atol=1e-9 * scale)
+            assert both.fleet.status.numpy()[i] == int(command.status)
+            seen |= int(command.status)
+            force = both.fleet["press"]
+            np.testing.assert_allclose(
+                force.error.numpy()[i], command.tasks["press"].error, rtol=0, atol=1e-9
+            )
+            found, told = both.stacks[i]["press"].touch, force.confidence.numpy()[i]
+            assert abs(found.confidence - told) < 1e-12
+            np.testing.assert_allclose(force.measured.numpy()[i], found.measured, atol=1e-10)
+            sure = max(sure, found.confidence)
+    assert osc.Status.WRENCH_STALE in osc.Status(seen)
+    assert sure > 0.3
+
+
+def test_a_wrench_that_is_no_number_brakes_its_robot_and_is_forgotten():
+    both, fair = (Beside(3, make=presses, alone=True, torque_limits="report") for _ in range(2))
+    Q, V = both.states(np.random.default_rng(32), 0.3, 0.0)
+    wrench = np.zeros((3, 6)) + [0.0, 0.0, 8.0, 0.0, 0.0, 0.0]
+    for k in range(8):
+        told = wrench.copy()
+        told[1, 2] = np.nan if k == 4 else 8.0
+        both.fleet["press"].wrench.assign(told)
+        fair.fleet["press"].wrench.assign(wrench)
+        tau, want = (x.fleet.step(0.002 * k, Q, V).numpy().copy() for x in (both, fair))
+        faults = both.fleet.status.numpy() & int(osc.Status.FAULT) != 0
+        assert faults.tolist() == [False, k == 4, False]
+        np.testing.assert_array_equal(tau[::2], want[::2])
+        if k < 4:
+            np.testing.assert_array_equal(tau, want)
+        assert np.isfinite(tau).all()
+
+
+@pytest.mark.parametrize(
+    ("name", "value"), [("force", 0.0), ("force", np.nan), ("ki", 30.0), ("kp", -0.1), ("kv", 0.0)]
+)
+def test_what_a_force_task_would_refuse_is_a_fault_of_its_robot(name, value):
+    both, fair = (Beside(3, make=presses, alone=True, torque_limits="report") for _ in range(2))
+    Q, V = both.states(np.random.default_rng(33), 0.3, 0.0)
+    told = getattr(both.fleet["press"], name)
+    wrong = told.numpy().copy()
+    wrong[1] = value
+    told.assign(wrong)
+    tau, want = (x.fleet.step(0.0, Q, V).numpy().copy() for x in (both, fair))
+    faults = both.fleet.status.numpy() & int(osc.Status.FAULT) != 0
+    assert faults.tolist() == [False, True, False]
+    np.testing.assert_array_equal(tau[::2], want[::2])
+
+
 def test_a_robot_that_is_reset_begins_anew_and_no_other_robot_notices():
     both, alone = (Beside(alone=True).prepare() for _ in range(2))
     rng = np.random.default_rng(4)
@@ -341,7 +456,6 @@ def test_a_robot_with_a_negative_gain_brakes_and_the_others_go_on(what):
 
 
 REFUSED = {
-    "needs a wrench": lambda: osc.ForceTask(name="press"),
     "reference in time": lambda: osc.PositionTask(target=osc.Circle([0.4, 0.0, 0.3], 0.1, 2.0)),
     "activation of its own": lambda: with_activation(osc.PositionTask()),
     "observer_time": lambda: osc.JointLimits(observer_time=0.005),
@@ -436,7 +550,7 @@ def test_a_workspace_that_a_device_has_no_room_for_is_refused_by_name():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("make", [tasks, springs, integrals, ways])
+@pytest.mark.parametrize("make", [tasks, springs, integrals, ways, presses])
 def test_nothing_is_read_before_it_is_written(make):
     clean, poisoned = (Beside(64, alone=True, make=make) for _ in range(2))
     if make is tasks:

@@ -49,7 +49,7 @@ def check_dynamics(dynamics: str, period: float | None) -> bool:
     return dynamics == "given"
 
 
-def check_task(task: Task, *, given: bool) -> TrackingTask:
+def check_task(task: Task, *, given: bool) -> TrackingTask | ForceTask:
     """Return a task that a fleet can evaluate.
 
     Args:
@@ -60,9 +60,7 @@ def check_task(task: Task, *, given: bool) -> TrackingTask:
         InputError: It cannot.
     """
     what = f"task {task.name!r} ({type(task).__name__})"
-    if isinstance(task, ForceTask):
-        raise InputError(f"{what} needs a wrench; a fleet takes tasks of motion and of joints")
-    if kind_of(task) == OWN or not isinstance(task, TrackingTask):
+    if kind_of(task) == OWN or not isinstance(task, TrackingTask | ForceTask):
         raise InputError(f"{what} is evaluated in Python; a fleet takes the library's own tasks")
     if given and kind_of(task) == MOMENTUM:
         raise InputError(f"{what} needs the robot's own dynamics; they are given")
@@ -71,7 +69,7 @@ def check_task(task: Task, *, given: bool) -> TrackingTask:
             f"{what} has an activation of its own, which is Python; write what it would give into "
             f"fleet[{task.name!r}].activation"
         )
-    if callable(task.target):
+    if isinstance(task, TrackingTask) and callable(task.target):
         raise InputError(
             f"{what} follows a reference in time, which is Python; write its values into "
             f"fleet[{task.name!r}].target, velocity and acceleration"

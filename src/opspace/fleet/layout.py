@@ -25,7 +25,7 @@ FROZEN = (
 )  # fmt: skip
 """Options that choose between ways to compute; what is not chosen need not be compiled."""
 
-BEGUN = ("kind", "numbers", "limit")
+BEGUN = ("kind", "numbers", "limit", "press")
 """What the plan begins and a tick goes on with, each robot for itself."""
 EMPTY = (
     *("U", "motors", "M", "bias", "placement", "velocity", "acceleration", "force", "inertia"),

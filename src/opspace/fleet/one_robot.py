@@ -7,8 +7,17 @@ import math
 from opspace.command import Status
 from opspace.fleet.integral_sums import forget_sum, learn, push
 from opspace.fleet.led_targets import forget_way, lead, look_at_robot
+from opspace.fleet.wrenches_of_robot import (
+    STALE,
+    forget_no_number,
+    forget_touch,
+    is_stale,
+    press_usable,
+    take_wrenches,
+)
 from opspace.kernels.columns import (
     FIRST_ROW,
+    FORCE,
     GOAL_ACCELERATION,
     GOAL_POSITION,
     GOAL_ROTATION,
@@ -55,15 +64,19 @@ def robot_tick(work, robot):
         elif work.kind[i, KIND] == JOINTS:
             _take_joints(work, robot, i)
     push(work, robot)
+    take_wrenches(work, robot)
     for i in range(work.kind.shape[0]):
         if _absent(work, i):
             _rest(work, i)
     answer = tick(0.0, work)
-    if answer < 0 or not _gains_usable(work, robot) or not _wishes_usable(work):
+    if answer < 0 or not _gains_usable(work, robot) or not _wishes_usable(work, robot):
         brake(work, work.tau)
+        forget_no_number(work)
         robot.status[0], robot.solves[0] = FAULT, 0
     else:
         robot.status[0], robot.solves[0] = answer % SOLVE, answer // SOLVE
+        if robot.status[0] & STALE != 0 and not _any_stale(work):
+            robot.status[0] -= STALE
     learn(work, robot, robot.status[0])
     for i in range(work.kind.shape[0]):
         robot.remembers[i] = work.kind[i, REMEMBERS]
@@ -90,11 +103,22 @@ def _rest(work, i):
                 work.goal[row, c] = 0.0
 
 
-def _wishes_usable(work):
+def _any_stale(work):
+    """Whether a force task in this robot's stack has had no new wrench for too long."""
+    stale = False
+    for i in range(work.kind.shape[0]):
+        if is_stale(work, i) and not _absent(work, i):
+            stale = True
+    return stale
+
+
+def _wishes_usable(work, robot):
     """Whether all that tasks ask for is finite; where nothing is left to them, no torque shows that."""
     for i in range(work.kind.shape[0]):
         if _absent(work, i):
             continue
+        if work.kind[i, KIND] == FORCE and not press_usable(work, robot, i):
+            return False
         for row in range(work.kind[i, FIRST_ROW], work.kind[i, FIRST_ROW] + work.kind[i, ROWS]):
             if not math.isfinite(work.fw[row]):
                 return False
@@ -124,6 +148,7 @@ def _begin(work, robot):
             robot.remembers[i] = 0
             forget_sum(work, robot, i)
             forget_way(work, robot, i)
+            forget_touch(work, i)
             robot.found[i] = robot.holds[i]
             robot.seen[i] = robot.epoch[i]
         work.kind[i, REMEMBERS] = robot.remembers[i]

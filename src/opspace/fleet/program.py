@@ -18,7 +18,7 @@ from opspace.fleet.led_targets import WITHOUT_WAYS
 from opspace.fleet.one_robot import robot_tick
 from opspace.fleet.precision import constants_of
 from opspace.fleet.robot_record import ROBOT, WAYS
-from opspace.fleet.task_arrays import TaskArrays
+from opspace.fleet.told_arrays import ToldArrays
 from opspace.fleet.warp_library import warp, workspace_of
 from opspace.kernels.columns import VARIABLE_SIZE
 from opspace.plan.plan import Plan
@@ -91,7 +91,7 @@ class FleetProgram:
     def __init__(
         self,
         plan: Plan,
-        arrays: list[TaskArrays],
+        arrays: list[ToldArrays],
         dtype: str,
         device: Any,
         kind: str,
@@ -122,7 +122,7 @@ class FleetProgram:
             place = self._address(self.workspace)
         lines = _lines(plan, arrays, given, self._address)
         integrates = any(task.integrates for task in arrays)
-        if integrates:
+        if integrates or any(task.presses for task in arrays):
             timing = _time_lines(arrays, self._address(ended))
             lines = lines[0] + timing[0], lines[1] + timing[1]
         numbers = layout.numbers
@@ -162,7 +162,7 @@ class FleetProgram:
 
 
 def _lines(
-    plan: Plan, arrays: list[TaskArrays], given: tuple[Any, Any] | None, address: Any
+    plan: Plan, arrays: list[ToldArrays], given: tuple[Any, Any] | None, address: Any
 ) -> tuple[list[str], list[str]]:
     """Write what a robot reads before its tick and what it tells after it."""
     nq, n = plan.axes.q.size, plan.n
@@ -208,7 +208,7 @@ def _lines(
     return before, after
 
 
-def _time_lines(arrays: list[TaskArrays], ended: str) -> tuple[list[str], list[str]]:
+def _time_lines(arrays: list[ToldArrays], ended: str) -> tuple[list[str], list[str]]:
     """Write what integrals need: how long it is since the tick before, and which tasks have none."""
     last = f"((double*){ended})[i]"
     before = [f"robot.since_()(0) = real({NOW} - {last});"]
@@ -216,7 +216,7 @@ def _time_lines(arrays: list[TaskArrays], ended: str) -> tuple[list[str], list[s
     return before, [f"{last} = {NOW};"]
 
 
-def _way_lines(arrays: list[TaskArrays], address: Any) -> tuple[list[str], list[str]]:
+def _way_lines(arrays: list[ToldArrays], address: Any) -> tuple[list[str], list[str]]:
     """Write what ways need: their limits, and how long it is since each began."""
     before, after = [], []
     for i, task in enumerate(arrays):
