@@ -339,6 +339,53 @@ def test_what_a_force_task_would_refuse_is_a_fault_of_its_robot(name, value):
     np.testing.assert_array_equal(tau[::2], want[::2])
 
 
+def followers(robot):
+    """Tasks that follow references, with the axes of the tool and with joints."""
+    axes = {"axes_frame": "tool"}
+    turn = osc.OrientationTask(axes="yz", name="turn", **axes)
+    place = osc.PositionTask(robot.frame_names[-3], axes="xz", name="place")
+    return [place, turn, osc.PostureTask(name="joints")], osc.PoseTask(name="pose")
+
+
+def references(robot, q, phase):
+    """A reference of each of them, and of each robot another."""
+    robot.update(q, np.zeros(robot.nv))
+    frame = robot.frame_id(robot.tool)
+    here, R = robot.position(frame).copy(), robot.rotation(frame).copy()
+    end = osc.tasks.rotation.exp_rotation(np.array([0.3, -0.5, 0.4])) @ R
+    turn = osc.OrientationMinimumJerk(R, end, 0.1 + phase, start_time=0.0)
+    circle = osc.Circle(here, 0.1, 0.4 + phase, start_time=0.0)
+    return {
+        "place": circle,
+        "turn": turn,
+        "joints": osc.MinimumJerk(q, q + 0.3, 0.1 + phase, start_time=0.0),
+        "pose": osc.PoseReference(circle, turn),
+    }
+
+
+def test_references_written_as_arrays_are_those_of_a_controller():
+    """Places, velocities and accelerations of every robot at every step."""
+    both = Beside(4, make=followers, torque_limits="report")
+    both.fleet.insert(both.later, 0, robots=[])
+    rng = np.random.default_rng(41)
+    Q, V = both.states(rng, 0.4, 0.3)
+    followed = [references(both.robot, q, 0.02 * i) for i, q in enumerate(Q)]
+    both.fleet.step(-1.0, Q, V)
+    both.fleet.reset()
+    for i, stack in enumerate(both.stacks):
+        for name, reference in followed[i].items():
+            (both.others[i] if name == "pose" else stack[name]).target = reference
+    for k in range(30):
+        if k == 12:
+            both.fleet.insert("pose", 0, 0.02, robots=[0, 3])
+            for i in (0, 3):
+                both.stacks[i].insert(both.others[i], 0, 0.02)
+        for i in range(both.count):
+            for name, reference in followed[i].items():
+                both.fleet[name].set_target(*reference(0.005 * k), robots=[i])
+        both.assert_same(0.005 * k, Q + 0.005 * k * V, V)
+
+
 def test_a_robot_that_is_reset_begins_anew_and_no_other_robot_notices():
     both, alone = (Beside(alone=True).prepare() for _ in range(2))
     rng = np.random.default_rng(4)

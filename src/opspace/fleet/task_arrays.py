@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -112,9 +112,8 @@ class TaskArrays(ToldArrays):
                 self.damping_ratio = self._filled(np.array(self.task.damping_ratio))
                 self.force = self._filled(self.task.force)
         if self.task.max_acceleration is not None and self.task.target is not None:
-            target = self._rows(self.task.target, 1)[
-                0
-            ]  # the plan has what is followed, at its start
+            # The plan has what the task follows, which is the beginning of a way.
+            target = self._rows(cast("ArrayLike", self.task.target), 1)[0]
         self.target, self.velocity, self.acceleration = map(
             self._filled, (target, velocity, acceleration)
         )
