@@ -13,6 +13,8 @@ import math
 
 ROOT_STEPS = 200
 """A root is found to the last digits in a dozen steps; no more than these are taken."""
+ROUNDING, TINIEST = 4e-16, 1e-300
+"""Part of a root, and size of it, that no number tells apart."""
 
 
 def driven(x: float, v: float, a: float, j: float, t: float) -> tuple[float, float, float]:
@@ -59,11 +61,19 @@ def changed(v: float, a: float, w: float, most: float, jerk: float) -> tuple[flo
 
 def far_with(push: float, top: float, v: float, a: float, most: float, jerk: float) -> float:
     """Return how far a motion goes that has these parts and never stays at its top speed."""
-    t = abs(push - a) / jerk
-    x, u, b = driven(0.0, v, a, jerk if push > a else -jerk, t)
-    there, _ = changed(u, b, top, most, jerk)
-    back, _ = changed(top, 0.0, 0.0, most, jerk)
-    return x + there + back
+    x = 0.0
+    if push != a:
+        x, v, a = driven(0.0, v, a, jerk if push > a else -jerk, abs(push - a) / jerk)
+    there, _ = changed(v, a, top, most, jerk)
+    return x + there + 0.5 * top * time_to_rest(top, most, jerk)
+
+
+def time_to_rest(top: float, most: float, jerk: float) -> float:
+    """Return how long it takes from a speed to none, with no acceleration at either end."""
+    size = abs(top)
+    if size * jerk > most * most:
+        return size / most + most / jerk
+    return 2.0 * math.sqrt(size / jerk)
 
 
 def part_that_reaches(
@@ -71,31 +81,32 @@ def part_that_reaches(
 ) -> float:
     """Find the push, or else the top speed, between two with which a motion goes as far as d.
 
-    Regula falsi in the form of Illinois, which halves where that is faster.
+    Inverse quadratic interpolation where it can be trusted, halving elsewhere (Chandrupatla 1997).
     """
-    p, q = low, high
+    p, q, r = high, low, low
     f = far_with(p if pushed else a, 0.0 if pushed else p, v, a, most, jerk) - d
     g = far_with(q if pushed else a, 0.0 if pushed else q, v, a, most, jerk) - d
-    halve = False
+    h, part = g, 0.5
     for _ in range(ROOT_STEPS):
-        width = abs(q - p)
-        middle = 0.5 * (p + q)
-        if not halve and f != g:
-            middle = q - g * (q - p) / (g - f)
-        if not (min(p, q) < middle < max(p, q)):
-            middle = 0.5 * (p + q)
-        if not (min(p, q) < middle < max(p, q)):
-            break
-        h = far_with(middle if pushed else a, 0.0 if pushed else middle, v, a, most, jerk) - d
-        if (h > 0.0) != (g > 0.0):
-            p, f = q, g
+        x = p + part * (q - p)
+        y = far_with(x if pushed else a, 0.0 if pushed else x, v, a, most, jerk) - d
+        if (y > 0.0) == (f > 0.0):
+            r, h = p, f
         else:
-            f = 0.5 * f
-        q, g = middle, h
-        if g == 0.0:
+            r, h = q, g
+            q, g = p, f
+        p, f = x, y
+        width = abs(q - p)
+        closest = p if abs(f) < abs(g) else q
+        least = 0.5 * (ROUNDING * abs(closest) + TINIEST) / width if width > 0.0 else 1.0
+        if f == 0.0 or g == 0.0 or not least <= 0.5:
             break
-        halve = abs(q - p) > 0.5 * width
-    return q
+        part = 0.5
+        along, across = (p - q) / (r - q), (f - g) / (h - g)
+        if across * across < along and (1.0 - across) * (1.0 - across) < 1.0 - along:
+            part = f / (g - f) * h / (g - h) + (r - p) / (q - p) * f / (h - f) * g / (h - g)
+        part = min(max(part, least), 1.0 - least)
+    return p if abs(f) < abs(g) else q
 
 
 def swift_motion(
@@ -137,8 +148,7 @@ def swift_time(
     t = abs(push - a) / jerk
     _, u, b = driven(0.0, v, a, jerk if push > a else -jerk, t)
     _, there = changed(u, b, top, most, jerk)
-    _, back = changed(top, 0.0, 0.0, most, jerk)
-    return t + there + stay + back
+    return t + there + stay + time_to_rest(top, most, jerk)
 
 
 def swift_at(
