@@ -206,6 +206,7 @@ def test_ways_to_new_targets_of_each_robot():
 
 def test_a_target_that_is_none_ends_a_way_which_begins_anew_where_the_robot_is():
     both = Beside(2, make=ways, alone=True, torque_limits="report")
+    both.fleet.insert(both.later, 0, robots=[])
     point = both.fleet["point"]
     Q, V = both.states(np.random.default_rng(22), 0.3, 0.0)
     both.fleet.step(0.0, Q, V)
@@ -307,6 +308,8 @@ def test_forces_of_each_robot():
 
 def test_a_wrench_that_is_no_number_brakes_its_robot_and_is_forgotten():
     both, fair = (Beside(3, make=presses, alone=True, torque_limits="report") for _ in range(2))
+    for one in (both, fair):
+        one.fleet.insert(one.later, 0, robots=[])
     Q, V = both.states(np.random.default_rng(32), 0.3, 0.0)
     wrench = np.zeros((3, 6)) + [0.0, 0.0, 8.0, 0.0, 0.0, 0.0]
     for k in range(8):
@@ -328,6 +331,8 @@ def test_a_wrench_that_is_no_number_brakes_its_robot_and_is_forgotten():
 )
 def test_what_a_force_task_would_refuse_is_a_fault_of_its_robot(name, value):
     both, fair = (Beside(3, make=presses, alone=True, torque_limits="report") for _ in range(2))
+    for one in (both, fair):
+        one.fleet.insert(one.later, 0, robots=[])
     Q, V = both.states(np.random.default_rng(33), 0.3, 0.0)
     told = getattr(both.fleet["press"], name)
     wrong = told.numpy().copy()
@@ -571,10 +576,9 @@ def with_program(both, **options):
     return fleet
 
 
-@pytest.mark.parametrize("dtype", ["float64", "float32"])
-def test_a_workspace_changes_no_bit(dtype):
+def test_a_workspace_changes_no_bit():
     """Numbers of 32 robots side by side, as on a card, and a part that is not full."""
-    local, spread = (Beside(40, dtype, alone=True, make=led) for _ in range(2))
+    local, spread = (Beside(40, "float32", alone=True, make=led) for _ in range(2))
     rng = np.random.default_rng(15)
     Q, V = local.states(rng)
     local.fleet.step(0.0, Q, V), spread.fleet.step(0.0, Q, V)
