@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from opspace.errors import UnknownNameError as UnknownNameError
     from opspace.export.c_library import export_c as export_c
     from opspace.fleet import Fleet as Fleet
+    from opspace.fleet import ForceArrays as ForceArrays
     from opspace.fleet import TaskArrays as TaskArrays
     from opspace.law import Activation as Activation
     from opspace.law import Buffer as Buffer
@@ -133,7 +134,7 @@ _NAMES = {
         "RobotStoppedError ScenarioError UnknownNameError"
     ),
     "opspace.export.c_library": "export_c",
-    "opspace.fleet": "Fleet TaskArrays",
+    "opspace.fleet": "Fleet ForceArrays TaskArrays",
     "opspace.law": (
         "Activation Buffer LawInfo Profile Ramp SigmaBuffer TaskSet intermediate_values task_torque"
     ),

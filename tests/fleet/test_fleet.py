@@ -159,6 +159,238 @@ def test_springs_of_each_robot():
         pose.set_gains(100.0)
 
 
+def ways(robot):
+    """Ways of a place, a turn and joints, which leave each other motions, and of a pose later."""
+    limits = {"max_speed": 0.4, "max_acceleration": 1.5}
+    point = osc.PositionTask(robot.frame_names[-3], axes="xz", name="point", **limits)
+    turn = osc.OrientationTask(axes="yz", axes_frame="tool", name="turn", **limits)
+    down = [0.4, 0.1, 0.2, 0.0, 1.0, 0.0, 0.0]
+    pose = osc.PoseTask(target=down, max_speed=(0.5, 1.0), max_acceleration=(2.0, 4.0), name="pose")
+    return [point, turn, osc.PostureTask(**limits)], pose
+
+
+def test_ways_to_new_targets_of_each_robot():
+    """From rest and on the way, with and without feed-forward, held and found, in and out again."""
+    both = Beside(make=ways, torque_limits="report")
+    both.fleet.insert(both.later, 0, robots=[])
+    rng = np.random.default_rng(21)
+    Q, V = both.states(rng, 0.4, 0.1)
+    poses = [0, 2]
+    for k in range(80):
+        if k in (2, 9, 20, 21, 30):
+            goals = [0.4, 0.1, 0.3] + rng.uniform(-0.2, 0.2, (both.count, 3))
+            turns = rng.normal(size=(both.count, 4))
+            turns /= np.linalg.norm(turns, axis=1, keepdims=True)
+            wholes, joints = np.hstack([goals, turns]), Q + rng.uniform(-0.5, 0.5, Q.shape)
+            told = {"point": goals[:, ::-1], "turn": turns, "posture": joints}
+            some = [i for i in range(both.count) if k != 9 or i % 2]
+            rates = [0.1, 0.0, 0.2] if k == 21 else None  # followed as it is
+            for name, targets in told.items():
+                moving = rates if name == "point" else None
+                both.fleet[name].set_target(targets[some], moving, moving, robots=some)
+                for i in some:
+                    both.stacks[i][name].set_target(targets[i], moving, moving)
+            if k > 15:
+                both.fleet["pose"].set_target(wholes[poses], robots=poses)
+                for i in poses:
+                    both.others[i].target = wholes[i]
+        for when, ask in ((15, "insert"), (40, "remove"), (44, "insert")):
+            if k == when:
+                given = (0, 0.01) if ask == "insert" else (0.01,)
+                getattr(both.fleet, ask)(both.later, *given, robots=poses)
+                for i in poses:
+                    getattr(both.stacks[i], ask)(both.others[i], *given)
+        jump = 5.0 * (k >= 70)  # to the ends of all ways
+        both.assert_same(0.01 * k + jump, Q + 0.01 * k * V, V)
+
+
+def test_a_target_that_is_none_ends_a_way_which_begins_anew_where_the_robot_is():
+    both = Beside(2, make=ways, alone=True, torque_limits="report")
+    both.fleet.insert(both.later, 0, robots=[])
+    point = both.fleet["point"]
+    Q, V = both.states(np.random.default_rng(22), 0.3, 0.0)
+    both.fleet.step(0.0, Q, V)
+    point.set_target([0.3, 0.2, 0.4])
+    both.fleet.step(0.1, Q, V)
+    both.fleet.step(0.2, Q, V)
+    assert (np.abs(point.error.numpy()).max(axis=1) > 1e-3).all(), "both are on their way"
+    fair = point.target.numpy().copy()
+    point.target.assign([[np.nan] * 3, fair[1]])
+    both.fleet.step(0.3, Q, V)
+    assert [bool(s & osc.Status.FAULT) for s in both.fleet.status.numpy()] == [True, False]
+    point.target.assign(fair)
+    both.fleet.step(0.4, Q, V)
+    error = np.abs(point.error.numpy()).max(axis=1)
+    assert error[0] < 1e-9
+    assert error[1] > 1e-2
+
+
+def presses(robot):
+    """A force along an axis with a moment that turns the tool onto what it touches, above motions."""
+    press = osc.ForceTask(
+        force=12.0, moment_axes="xy", kp=0.2, max_integral=4.0, approach_speed=0.1, name="press"
+    )
+    slide = osc.PositionTask(axes="xy", axes_frame="tool", name="slide")
+    return [osc.JointLimits(), press, slide, osc.PostureTask()], osc.ForceTask(
+        robot.frame_names[-3],
+        [5.0, 3.0],
+        axes="xz",
+        axes_frame="world",
+        friction=False,
+        name="late",
+    )
+
+
+def told_wrenches(both, given):
+    """Tell all robots wrenches, or that there is nothing new, by name."""
+    for name, (wrench, fresh) in given.items():
+        both.fleet[name].wrench.assign(wrench)
+        both.fleet[name].fresh.assign(fresh.astype(np.int64))
+    return [
+        {
+            both.fleet[name].task.sensor: wrench[i] if fresh[i] else None
+            for name, (wrench, fresh) in given.items()
+        }
+        for i in range(both.count)
+    ]
+
+
+def test_forces_of_each_robot():
+    """In the air, in contact, lost, late wrenches, another force, in and out again."""
+    both = Beside(make=presses, torque_limits="report")
+    both.fleet.insert(both.later, 0, robots=[])
+    with pytest.raises(osc.InputError, match="'late' has its arrays from the next step on"):
+        both.fleet["late"].wrench.zero_()
+    rng = np.random.default_rng(31)
+    Q, V = both.states(rng, 0.3, 0.05)
+    both.fleet.step(-1.0, Q, V)
+    both.fleet.reset()
+    seen, sure = 0, 0.0
+    for k in range(90):
+        for when, ask in ((20, "insert"), (50, "remove"), (60, "insert")):
+            if k == when:
+                given = (0, 0.01) if ask == "insert" else (0.01,)
+                getattr(both.fleet, ask)(both.later, *given, robots=[0, 2])
+                for i in (0, 2):
+                    getattr(both.stacks[i], ask)(both.others[i], *given)
+        if k == 30:
+            both.fleet["press"].set_force([20.0, 0.1, 0.0], robots=[1])
+            both.stacks[1]["press"].force, both.stacks[1]["press"].moment = 20.0, [0.1, 0.0]
+        touch = 0.0 if k < 10 or 70 < k < 80 else 9.0
+        q, t = Q + 0.002 * k * V, 0.002 * k
+        press = touch * rng.uniform(-0.1, 0.1, (both.count, 6))
+        for i in range(both.count):
+            both.robot.update(q[i], V[i])
+            press[i, :3] += touch * both.robot.rotation(both.robot.tool)[:, 2]
+        fresh = rng.random(both.count) < 0.7
+        fresh[:] |= k == 0
+        fresh[4] &= not 40 < k < 60  # for so long that it is stale
+        given = {"press": (press, fresh), "late": (0.5 * press, np.ones(both.count, bool))}
+        wrenches = told_wrenches(both, given)
+        tau = both.fleet.step(t, q, V).numpy()
+        for i, controller in enumerate(both.controllers):
+            command = controller.step(t, q[i], V[i], wrenches=wrenches[i])
+            scale = max(1.0, float(np.abs(command.tau).max()))
+            np.testing.assert_allclose(tau[i], command.tau, rtol=0, atol=1e-9 * scale)
+            assert both.fleet.status.numpy()[i] == int(command.status)
+            seen |= int(command.status)
+            force = both.fleet["press"]
+            np.testing.assert_allclose(
+                force.error.numpy()[i], command.tasks["press"].error, rtol=0, atol=1e-9
+            )
+            found, told = both.stacks[i]["press"].touch, force.confidence.numpy()[i]
+            assert abs(found.confidence - told) < 1e-12
+            np.testing.assert_allclose(force.measured.numpy()[i], found.measured, atol=1e-10)
+            sure = max(sure, found.confidence)
+    assert osc.Status.WRENCH_STALE in osc.Status(seen)
+    assert sure > 0.3
+
+
+def test_a_wrench_that_is_no_number_brakes_its_robot_and_is_forgotten():
+    both, fair = (Beside(3, make=presses, alone=True, torque_limits="report") for _ in range(2))
+    for one in (both, fair):
+        one.fleet.insert(one.later, 0, robots=[])
+    Q, V = both.states(np.random.default_rng(32), 0.3, 0.0)
+    wrench = np.zeros((3, 6)) + [0.0, 0.0, 8.0, 0.0, 0.0, 0.0]
+    for k in range(8):
+        told = wrench.copy()
+        told[1, 2] = np.nan if k == 4 else 8.0
+        both.fleet["press"].wrench.assign(told)
+        fair.fleet["press"].wrench.assign(wrench)
+        tau, want = (x.fleet.step(0.002 * k, Q, V).numpy().copy() for x in (both, fair))
+        faults = both.fleet.status.numpy() & int(osc.Status.FAULT) != 0
+        assert faults.tolist() == [False, k == 4, False]
+        np.testing.assert_array_equal(tau[::2], want[::2])
+        if k < 4:
+            np.testing.assert_array_equal(tau, want)
+        assert np.isfinite(tau).all()
+
+
+@pytest.mark.parametrize(
+    ("name", "value"), [("force", 0.0), ("force", np.nan), ("ki", 30.0), ("kp", -0.1), ("kv", 0.0)]
+)
+def test_what_a_force_task_would_refuse_is_a_fault_of_its_robot(name, value):
+    both, fair = (Beside(3, make=presses, alone=True, torque_limits="report") for _ in range(2))
+    for one in (both, fair):
+        one.fleet.insert(one.later, 0, robots=[])
+    Q, V = both.states(np.random.default_rng(33), 0.3, 0.0)
+    told = getattr(both.fleet["press"], name)
+    wrong = told.numpy().copy()
+    wrong[1] = value
+    told.assign(wrong)
+    tau, want = (x.fleet.step(0.0, Q, V).numpy().copy() for x in (both, fair))
+    faults = both.fleet.status.numpy() & int(osc.Status.FAULT) != 0
+    assert faults.tolist() == [False, True, False]
+    np.testing.assert_array_equal(tau[::2], want[::2])
+
+
+def followers(robot):
+    """Tasks that follow references, with the axes of the tool and with joints."""
+    axes = {"axes_frame": "tool"}
+    turn = osc.OrientationTask(axes="yz", name="turn", **axes)
+    place = osc.PositionTask(robot.frame_names[-3], axes="xz", name="place")
+    return [place, turn, osc.PostureTask(name="joints")], osc.PoseTask(name="pose")
+
+
+def references(robot, q, phase):
+    """A reference of each of them, and of each robot another."""
+    robot.update(q, np.zeros(robot.nv))
+    frame = robot.frame_id(robot.tool)
+    here, R = robot.position(frame).copy(), robot.rotation(frame).copy()
+    end = osc.tasks.rotation.exp_rotation(np.array([0.3, -0.5, 0.4])) @ R
+    turn = osc.OrientationMinimumJerk(R, end, 0.1 + phase, start_time=0.0)
+    circle = osc.Circle(here, 0.1, 0.4 + phase, start_time=0.0)
+    return {
+        "place": circle,
+        "turn": turn,
+        "joints": osc.MinimumJerk(q, q + 0.3, 0.1 + phase, start_time=0.0),
+        "pose": osc.PoseReference(circle, turn),
+    }
+
+
+def test_references_written_as_arrays_are_those_of_a_controller():
+    """Places, velocities and accelerations of every robot at every step."""
+    both = Beside(4, make=followers, torque_limits="report")
+    both.fleet.insert(both.later, 0, robots=[])
+    rng = np.random.default_rng(41)
+    Q, V = both.states(rng, 0.4, 0.3)
+    followed = [references(both.robot, q, 0.02 * i) for i, q in enumerate(Q)]
+    both.fleet.step(-1.0, Q, V)
+    both.fleet.reset()
+    for i, stack in enumerate(both.stacks):
+        for name, reference in followed[i].items():
+            (both.others[i] if name == "pose" else stack[name]).target = reference
+    for k in range(30):
+        if k == 12:
+            both.fleet.insert("pose", 0, 0.02, robots=[0, 3])
+            for i in (0, 3):
+                both.stacks[i].insert(both.others[i], 0, 0.02)
+        for i in range(both.count):
+            for name, reference in followed[i].items():
+                both.fleet[name].set_target(*reference(0.005 * k), robots=[i])
+        both.assert_same(0.005 * k, Q + 0.005 * k * V, V)
+
+
 def test_a_robot_that_is_reset_begins_anew_and_no_other_robot_notices():
     both, alone = (Beside(alone=True).prepare() for _ in range(2))
     rng = np.random.default_rng(4)
@@ -211,6 +443,33 @@ def test_single_precision():
     assert lost > 100, "bounds that contradict each other, as well"
 
 
+def led(robot):
+    """The tasks of all these tests, on ways."""
+    stack, later = tasks(robot)
+    for task in stack[1:3]:
+        task.max_speed, task.max_acceleration = 0.5, 2.0
+    return stack, later
+
+
+def test_ways_in_single_precision():
+    double, single = (Beside(200, d, alone=True, make=led) for d in ("float64", "float32"))
+    rng, errors = np.random.default_rng(23), []
+    Q, V = single.states(rng, 0.5, 0.1)
+    for k in range(24):
+        if k in (2, 12):  # from rest, and on the way
+            goals = ([0.4, 0.1, 0.3] + rng.uniform(-0.2, 0.2, (200, 3))).astype(np.float32)
+            for both in (double, single):
+                both.fleet["position"].set_target(goals)
+                both.fleet["orientation"].set_target([0, 1, 0, 0] if k == 2 else [0, 0, 1, 0])
+        q = (Q + np.float32(0.01 * k) * V).astype(np.float32)
+        want = double.fleet.step(0.01 * k, q.astype(float), V.astype(float)).numpy()
+        tau = single.fleet.step(0.01 * k, q, V).numpy()
+        errors.append(np.abs(tau - want).max(axis=1) / np.abs(want).max(axis=1))
+    assert np.median(errors) < 1e-6
+    assert np.quantile(errors, 0.99) < 1e-5
+    assert np.max(errors) < 1e-3
+
+
 def test_times_on_the_device_and_a_place_for_the_torques():
     wp = pytest.importorskip("warp")
     both = Beside(alone=True).prepare()
@@ -249,10 +508,8 @@ def test_a_robot_with_a_negative_gain_brakes_and_the_others_go_on(what):
 
 
 REFUSED = {
-    "needs a wrench": lambda: osc.ForceTask(name="press"),
     "reference in time": lambda: osc.PositionTask(target=osc.Circle([0.4, 0.0, 0.3], 0.1, 2.0)),
     "activation of its own": lambda: with_activation(osc.PositionTask()),
-    "on a way": lambda: osc.PositionTask(max_speed=0.3, max_acceleration=1.0),
     "observer_time": lambda: osc.JointLimits(observer_time=0.005),
 }
 
@@ -307,23 +564,53 @@ def test_wrong_input_is_refused_by_name():
         osc.Fleet(both.robot, osc.Stack([osc.PostureTask()]), 0, device="cpu")
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("make", [tasks, springs, integrals])
-def test_nothing_is_read_before_it_is_written(make):
+def with_program(both, **options):
+    """Let a fleet that has made a step go on with a program of its own."""
     from opspace.fleet.program import FleetProgram
 
+    fleet = both.fleet
+    plan = fleet._controller.plan_apart(fleet._roster.present)
+    fleet._program = FleetProgram(
+        plan, list(fleet), fleet.dtype, fleet.device, "cpu", ended=fleet._ended, **options
+    )
+    return fleet
+
+
+def test_a_workspace_changes_no_bit():
+    """Numbers of 32 robots side by side, as on a card, and a part that is not full."""
+    local, spread = (Beside(40, "float32", alone=True, make=led) for _ in range(2))
+    rng = np.random.default_rng(15)
+    Q, V = local.states(rng)
+    local.fleet.step(0.0, Q, V), spread.fleet.step(0.0, Q, V)
+    fleet = with_program(spread, lanes=32)
+    assert fleet._program.workspace.size * 8 == 64 * fleet._program.memory
+    for k in range(6):
+        Q, V = local.states(rng, spread=0.5 * k, speed=2.0)
+        local.fleet["position"].set_target(Q[0, :3])
+        fleet["position"].set_target(Q[0, :3])
+        want = local.fleet.step(0.01 * k, Q, V).numpy()
+        np.testing.assert_array_equal(fleet.step(0.01 * k, Q, V).numpy(), want)
+        np.testing.assert_array_equal(fleet.status.numpy(), local.fleet.status.numpy())
+
+
+def test_a_workspace_that_a_device_has_no_room_for_is_refused_by_name():
+    from opspace.fleet.warp_library import device_of, workspace_of
+
+    with pytest.raises(osc.InputError, match=r"1000000000 of these robots .* MiB, which cpu"):
+        workspace_of(10**9, 10**6, 32, device_of("cpu"))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("make", [tasks, springs, integrals, ways, presses])
+def test_nothing_is_read_before_it_is_written(make):
     clean, poisoned = (Beside(64, alone=True, make=make) for _ in range(2))
     if make is tasks:
         clean.prepare()
         poisoned.prepare()
-    fleet, rng = poisoned.fleet, np.random.default_rng(9)
+    rng = np.random.default_rng(9)
     Q, V = clean.states(rng)
-    clean.fleet.step(0.0, Q, V), fleet.step(0.0, Q, V)
-    arrays = list(fleet)
-    plan = fleet._controller.plan_apart(fleet._roster.present)
-    fleet._program = FleetProgram(
-        plan, arrays, fleet.dtype, fleet.device, "cpu", ended=fleet._ended, poison=True
-    )
+    clean.fleet.step(0.0, Q, V), poisoned.fleet.step(0.0, Q, V)
+    fleet = with_program(poisoned, poison=True)
     for k in range(8):
         Q, V = clean.states(rng, spread=0.4 * k, speed=2.0)
         tau = fleet.step(0.001 * k, Q, V).numpy()

@@ -99,3 +99,41 @@ def test_steps_take_no_memory(monkeypatch):
     assert counting.count == 0
     wp.zeros(3, device=device)
     assert counting.count == 1
+
+
+def buried(robot):
+    """Tasks to which the posture leaves no motion."""
+    stack = [osc.PostureTask(), osc.PositionTask(target=[0.4, 0.1, 0.3]), osc.OrientationTask()]
+    return stack, osc.JointTask(robot.joint_names[2], 0.3, name="elbow")
+
+
+@pytest.mark.parametrize("name", ["position", "orientation", "elbow"])
+@pytest.mark.parametrize("where", ["nothing is left", "on its way out", "with no activation"])
+def test_a_target_that_is_no_number_brakes_its_robot_only(name, where):
+    wrong, fair = (Beside(4, alone=True, make=buried) for _ in range(2))
+    Q, V = wrong.states(np.random.default_rng(3), spread=0.5)
+    for both in (wrong, fair):
+        both.fleet.insert(both.later, 2, 0.0)
+        both.fleet.step(0.0, Q, V)
+        if where == "on its way out":
+            both.fleet.remove(name, 0.1)
+        if where == "with no activation":
+            both.fleet[name].activation.zero_()
+        both.fleet.step(0.01, Q, V)
+    target = wrong.fleet[name].target
+    right = target.numpy().copy()
+    none = right.copy()
+    none[2, -1] = np.nan
+    target.assign(none)
+    tau, want = (both.fleet.step(0.02, Q, V).numpy().copy() for both in (wrong, fair))
+    faults = wrong.fleet.status.numpy() & int(osc.Status.FAULT) != 0
+    assert faults.tolist() == [False, False, True, False]
+    np.testing.assert_array_equal(tau[~faults], want[~faults])
+    assert np.isfinite(tau).all()
+    target.assign(right)
+    for t in (0.03, 0.3):  # where it has gone out, nothing about it matters
+        tau, want = (both.fleet.step(t, Q, V).numpy().copy() for both in (wrong, fair))
+        np.testing.assert_array_equal(tau, want)
+        np.testing.assert_array_equal(wrong.fleet.status.numpy(), fair.fleet.status.numpy())
+        if where == "on its way out":
+            target.assign(none)

@@ -90,3 +90,29 @@ def test_what_needs_dynamics_of_ones_own_is_refused_by_name():
         osc.Fleet(robot, osc.Stack(levels(robot)), 1, dynamics="given", period=0.001)
     with pytest.raises(osc.UnknownNameError, match="'taken'"):
         osc.Fleet(robot, osc.Stack(levels(robot)), 1, dynamics="taken")
+
+
+def test_a_force_is_the_same_with_dynamics_of_ones_own_and_given():
+    robot = osc.load_robot("puma560")
+
+    def stack():
+        press = osc.ForceTask(force=[9, 0, 6], axes="xyz", axes_frame="world", name="pose")
+        point = osc.PositionTask(robot.frame_names[-2], axes="z", target=[0, 0, 0.3], name="elbow")
+        spring = osc.ImpedanceTask(robot.frame_names[-3], target=[0.2] * 3, name="spring")
+        return osc.Stack([press, point, spring, osc.PostureTask(target=robot.q_reference)])
+
+    own, given = (
+        osc.Fleet(robot, stack(), COUNT, device="cpu", dynamics=d) for d in ("own", "given")
+    )
+    rng = np.random.default_rng(4)
+    Q = robot.q_reference + rng.uniform(-0.3, 0.3, (COUNT, 6))
+    V = rng.uniform(-0.1, 0.1, Q.shape)
+    for k in range(8):
+        q = Q + 0.002 * k * V
+        write(given, q, V)
+        wrench = 8.0 * rng.uniform(0.8, 1.2, (COUNT, 6)) * (k > 2)
+        for fleet in (own, given):
+            fleet["pose"].wrench.assign(wrench)
+        want, tau = (fleet.step(0.002 * k, q, V).numpy() for fleet in (own, given))
+        np.testing.assert_allclose(tau, want, rtol=0, atol=1e-9 * np.abs(want).max())
+    assert given["pose"].confidence.numpy().min() > 0.01

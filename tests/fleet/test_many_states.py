@@ -7,6 +7,8 @@ import pytest
 
 import opspace as osc
 from opspace.bench import SCENES
+from opspace.fleet.layout import LANES
+from opspace.fleet.program import FleetProgram
 from opspace.robots import available_robots
 
 pytest.importorskip("warp", reason="fleets run in Warp: pip install 'opspace[gpu]'")
@@ -47,7 +49,12 @@ def test_robots_of_thirty_joints_do_what_their_controllers_do():
         return osc.Stack([list(level) for level in scene.levels()], limits=osc.JointLimits())
 
     fleet = osc.Fleet(robot, stack(), count, device="cpu", torque_limits="priority")
-    tau = fleet.step(0.0, Q, V).numpy()
+    tau = fleet.step(0.0, Q, V).numpy().copy()
+    fleet.reset()
+    plan = fleet._controller.plan_apart(fleet._roster.present)
+    told = list(fleet), fleet.dtype, fleet.device
+    fleet._program = FleetProgram(plan, *told, "cpu", ended=fleet._ended, lanes=LANES)
+    np.testing.assert_array_equal(fleet.step(0.0, Q, V).numpy(), tau)  # as a card does it
     for i in range(count):
         controller = osc.Controller(scene.robot(), stack(), torque_limits="priority")
         command = controller.step(0.0, Q[i], V[i])

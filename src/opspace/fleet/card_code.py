@@ -27,6 +27,7 @@ class CardCode:
     Attributes:
         arch: The kind of card, as ``"sm_90"``.
         needs: Registers, local memory and instructions.
+        workspace: Bytes of a workspace that a robot takes beside that.
         spills: Bytes that are written to memory and read from it again for want of registers, in all
             functions together; None where there is no ``ptxas``, NVIDIA's assembler, that is as new
             as what Warp compiles with.
@@ -35,6 +36,7 @@ class CardCode:
 
     arch: str
     needs: Needs
+    workspace: int
     spills: tuple[int, int] | None
     seconds: float
 
@@ -49,7 +51,8 @@ def card_code(fleet: Fleet, arch: str = "sm_90") -> CardCode:
     Raises:
         InputError: Warp does not compile for it.
     """
-    module, number = fleet.program_for("cuda").kernel.module, _number(arch)
+    program, number = fleet.program_for("cuda"), _number(arch)
+    module = program.kernel.module
     with tempfile.TemporaryDirectory() as place:
         start = perf_counter()
         compiled = _compiled(module, number, place, ptx=False)
@@ -59,7 +62,8 @@ def card_code(fleet: Fleet, arch: str = "sm_90") -> CardCode:
         text = _compiled(module, number, place, ptx=True).read_bytes().rstrip(b"\0")
         found = (_spills(assembler, arch, text, Path(place)) for assembler in _assemblers())
         spills = next((known for known in found if known is not None), None)
-    return CardCode(arch, needs, spills, seconds)
+    workspace = 0 if program.workspace is None else program.memory
+    return CardCode(arch, needs, workspace, spills, seconds)
 
 
 def _number(arch: str) -> int:

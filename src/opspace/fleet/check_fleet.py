@@ -30,25 +30,6 @@ def check_robot(controller: Controller) -> None:
 
 
 DYNAMICS = ("own", "given")
-MOST_MEMORY = 512 * 1024
-"""Bytes of local memory that CUDA gives a thread at most."""
-
-
-def check_memory(robot: str, memory: int) -> None:
-    """Check that a thread of a graphics card has room for what a robot works in.
-
-    Args:
-        robot: Name of the robot.
-        memory: Bytes that each robot has for itself.
-
-    Raises:
-        InputError: It has not.
-    """
-    if memory > MOST_MEMORY:
-        raise InputError(
-            f"each {robot!r} of this fleet works in {memory} B, and a thread of a graphics card has "
-            f"{MOST_MEMORY} B; give the stack fewer rows and levels, or the fleet device='cpu'"
-        )
 
 
 def check_dynamics(dynamics: str, period: float | None) -> bool:
@@ -68,7 +49,7 @@ def check_dynamics(dynamics: str, period: float | None) -> bool:
     return dynamics == "given"
 
 
-def check_task(task: Task, *, given: bool) -> TrackingTask:
+def check_task(task: Task, *, given: bool) -> TrackingTask | ForceTask:
     """Return a task that a fleet can evaluate.
 
     Args:
@@ -79,9 +60,7 @@ def check_task(task: Task, *, given: bool) -> TrackingTask:
         InputError: It cannot.
     """
     what = f"task {task.name!r} ({type(task).__name__})"
-    if isinstance(task, ForceTask):
-        raise InputError(f"{what} needs a wrench; a fleet takes tasks of motion and of joints")
-    if kind_of(task) == OWN or not isinstance(task, TrackingTask):
+    if kind_of(task) == OWN or not isinstance(task, TrackingTask | ForceTask):
         raise InputError(f"{what} is evaluated in Python; a fleet takes the library's own tasks")
     if given and kind_of(task) == MOMENTUM:
         raise InputError(f"{what} needs the robot's own dynamics; they are given")
@@ -90,12 +69,7 @@ def check_task(task: Task, *, given: bool) -> TrackingTask:
             f"{what} has an activation of its own, which is Python; write what it would give into "
             f"fleet[{task.name!r}].activation"
         )
-    if task.max_acceleration is not None:
-        raise InputError(
-            f"{what} goes to new targets on a way (max_acceleration), which a fleet does not; move "
-            f"fleet[{task.name!r}].target along one"
-        )
-    if callable(task.target):
+    if isinstance(task, TrackingTask) and callable(task.target):
         raise InputError(
             f"{what} follows a reference in time, which is Python; write its values into "
             f"fleet[{task.name!r}].target, velocity and acceleration"

@@ -9,18 +9,20 @@ import numpy as np
 
 from opspace.controller import Controller
 from opspace.errors import InputError
-from opspace.fleet.check_fleet import check_dynamics, check_memory, check_robot, check_task
+from opspace.fleet.check_fleet import check_dynamics, check_robot, check_task
+from opspace.fleet.force_arrays import ForceArrays
 from opspace.fleet.precision import dtype_name
 from opspace.fleet.program import FleetProgram
 from opspace.fleet.roster import Roster
 from opspace.fleet.task_arrays import TaskArrays
+from opspace.fleet.told_arrays import ToldArrays
 from opspace.fleet.warp_library import as_warp, device_of, robots_of, warp
 from opspace.plan.plan import Plan
 from opspace.plan.scales import DEFAULT_SINGULARITY, Singularity
 from opspace.robots.protocol import Robot
 from opspace.stack import Blending, Stack
 from opspace.stack.changes import Timing, checked_level, checked_task
-from opspace.tasks import Task
+from opspace.tasks import ForceTask, Task
 from opspace.tasks.validation import finite
 
 BLOCK = 32
@@ -112,7 +114,7 @@ class Fleet:
         self.given = check_dynamics(dynamics, period)
         self.robot = robot
         self._roster = Roster(count)
-        self._arrays: dict[str, TaskArrays] = {}
+        self._arrays: dict[str, ToldArrays] = {}
         for level, tasks in stack.levels_by_number.items():
             for task in tasks:
                 self._roster.start_with(check_task(task, given=self.given), level)
@@ -134,15 +136,19 @@ class Fleet:
         where = f"on {self.device}, {self.dtype}"
         return f"Fleet of {self.count} {self.robot.name!r} {where}; tasks: {names}"
 
-    def __getitem__(self, name: str) -> TaskArrays:
-        """Return what a task of this name is told and tells.
+    def __getitem__(self, name: str) -> Any:
+        """Return what a task of this name is told and tells: `TaskArrays` or `ForceArrays`.
 
         Raises:
             UnknownNameError: There is none.
+            InputError: It has been asked for since the last step, and comes with the next one.
         """
-        return self._arrays[self._roster.find(str(name)).name]
+        found = self._roster.find(str(name)).name
+        if found not in self._arrays:
+            raise InputError(f"task {found!r} has its arrays from the next step on")
+        return self._arrays[found]
 
-    def __iter__(self) -> Iterator[TaskArrays]:
+    def __iter__(self) -> Iterator[Any]:
         """Iterate over the tasks, also those that no robot has in its stack at the moment."""
         return iter(self._arrays.values())
 
@@ -354,7 +360,8 @@ class Fleet:
         plan = self._controller.plan_apart(roster.present)
         for name, member in roster.members.items():
             if name not in self._arrays:
-                self._arrays[name] = TaskArrays(member.task, self.count, self._real, self.device)
+                kind: Any = ForceArrays if isinstance(member.task, ForceTask) else TaskArrays
+                self._arrays[name] = kind(member.task, self.count, self._real, self.device)
         arrays = list(self._arrays.values())
         for one, packed in zip(arrays, plan.packed, strict=True):
             one.begin(plan.tick, packed.index, packed.rows, given=self.given)
@@ -369,8 +376,6 @@ class Fleet:
         self._ramps = wp.array(roster.ramps(plan.variables), dtype=wp.float64, device=self.device)
         self._plan = plan
         self._program = self.program_for("cpu" if self.device.is_cpu else "cuda")
-        if not self.device.is_cpu:
-            check_memory(self.robot.name, self._program.memory)
 
     def _zeros(self, shape: tuple[int, ...]) -> Any:
         return warp().zeros(shape, dtype=self._real, device=self.device)

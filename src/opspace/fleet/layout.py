@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -24,7 +25,7 @@ FROZEN = (
 )  # fmt: skip
 """Options that choose between ways to compute; what is not chosen need not be compiled."""
 
-BEGUN = ("kind", "numbers", "limit")
+BEGUN = ("kind", "numbers", "limit", "press")
 """What the plan begins and a tick goes on with, each robot for itself."""
 EMPTY = (
     *("U", "motors", "M", "bias", "placement", "velocity", "acceleration", "force", "inertia"),
@@ -33,9 +34,13 @@ EMPTY = (
 """What a tick does not write everywhere and reads as zero there: a fleet stands on nothing, and springs
 have no gains."""
 
-DIGITS = ("dynamics", "later", "bounds")
+DIGITS = ("dynamics", "later", "bounds", "ways")
 """Records that count with sixteen digits in every fleet. Inertias seen from the origin of the world lose
-three where wrists are light, and the multipliers of bounds that contradict each other seven."""
+three where wrists are light, and the multipliers of bounds that contradict each other seven. What a way
+to a target has to make good across itself is a difference of near numbers."""
+
+LANES = 32
+"""Threads that cards run as one. In a workspace the same number of as many robots lies side by side."""
 
 PLACES = {"real": ("numbers", "fixed"), "double": ("exact", "fixed"), "I": ("integers", "whole")}
 """Where arrays of a type are that a robot has for itself, and those that robots share."""
@@ -54,6 +59,8 @@ class RobotLayout:
         records: Other records by their names in C++, whose arrays every robot has for itself; the
             tick's own reaches them by these names.
         poison: Whether memory that nothing has to begin begins as numbers that are none.
+        lanes: None where each robot works in local memory of its thread; else how many robots share a
+            part of a workspace, in which the same number of each lies beside that of the next.
 
     Attributes:
         numbers: What robots share, as numbers.
@@ -61,17 +68,23 @@ class RobotLayout:
     """
 
     def __init__(
-        self, tick: Record, records: Mapping[str, Record], *, poison: bool = False
+        self,
+        tick: Record,
+        records: Mapping[str, Record],
+        *,
+        poison: bool = False,
+        lanes: int | None = None,
     ) -> None:
         self._poison = poison
+        self._lanes, self._step = lanes, lanes or 1
         self._records = {**records, "work": tick}
-        self._kinds: dict[tuple[str, tuple[int, ...]], str] = {}
+        self._kinds: dict[_Kind, str] = {}
         self._option = tick.option
         found = {id(a): (f, a) for r in self._records.values() for f, a in _arrays(r) if a.size}
         exact = {
             id(array): (field, array)
             for name in DIGITS
-            for field, array in _arrays(getattr(tick, name))
+            for field, array in _arrays(records[name] if name in records else getattr(tick, name))
             if array.dtype == np.float64 and array.size and not _shared(field)
         }
         rest = [pair for key, pair in found.items() if key not in exact]
@@ -87,20 +100,37 @@ class RobotLayout:
 
     def types(self) -> str:
         """Return the types of all arrays and records."""
-        return "\n".join([*_array_types(self._kinds, self._frozen()), *self._structs])
+        return "\n".join([*_array_types(self._kinds, self._frozen(), self._step), *self._structs])
 
     def memory_of(self, number: int) -> int:
         """Return how many bytes a robot has for itself if a number has so many."""
         sizes = {"real": number, "double": 8, "I": 8}
-        return sum(blocks.size * sizes[kind] for kind, blocks in self._blocks.items())
+        found = sum(blocks.size * sizes[kind] for kind, blocks in self._blocks.items())
+        return -(-found // 8) * 8
 
-    def definitions(self) -> str:
-        """Return the definitions of all records, for one robot."""
-        lines = [
-            line
-            for kind, blocks in self._blocks.items()
-            for line in blocks.begin(kind, *PLACES[kind], self._poison)
-        ]
+    def definitions(self, workspace: str = "") -> str:
+        """Return the definitions of all records, for one robot.
+
+        Args:
+            workspace: Where the workspace begins, unless robots work in local memory.
+        """
+        lines = []
+        if self._lanes:
+            each = " + ".join(f"{b.size} * sizeof({kind})" for kind, b in self._blocks.items())
+            lines = [
+                f"char* part = (char*){workspace} + (I)(i / {self._lanes}) * {self._lanes} * ({each});"
+            ]
+        # Numbers of eight bytes come first, so that all are where their type wants them.
+        for kind in ("double", "I", "real"):
+            blocks, (own, shared) = self._blocks[kind], PLACES[kind]
+            if self._lanes:
+                lines += [
+                    f"{kind}* const {own} = ({kind}*)part + i % {self._lanes};",
+                    f"part += {blocks.size * self._lanes} * sizeof({kind});",
+                ]
+            else:
+                lines.append(f"{kind} {own}[{blocks.size + 1}];")
+            lines += blocks.begin(kind, own, shared, self._step, self._poison)
         lines += [f"const Of_{name} {name}{{{BLOCKS}}};" for name in self._records]
         return "\n".join(lines)
 
@@ -127,8 +157,9 @@ class RobotLayout:
     def _kind(self, name: str, array: np.ndarray) -> str:
         if name == "option":
             return "Options"
-        key = self._type(array), array.shape
-        return self._kinds.setdefault(key, "_".join([key[0], *map(str, array.shape)]))
+        kind = self._type(array)
+        key = _Kind(kind, array.shape, own=id(array) in self._blocks[kind].own)
+        return self._kinds.setdefault(key, key.name)
 
     def _type(self, array: np.ndarray) -> str:
         if id(array) in self._blocks["double"].own:
@@ -142,7 +173,7 @@ class RobotLayout:
             return f"({kind}*)0"
         blocks, (own, shared) = self._blocks[kind], PLACES[kind]
         if id(array) in blocks.own:
-            return f"{own} + {blocks.own[id(array)]}"
+            return f"{own} + {blocks.own[id(array)] * self._step}"
         return f"({kind}*){shared} + {blocks.of_all[id(array)]}"
 
     def _frozen(self) -> dict[int, float]:
@@ -169,16 +200,35 @@ class _Blocks:
         self._known = self._begun + sum(array.size for array in empty)
         self._turns = [self.own[id(a)] for f, a in own if f.name == "placement"]
 
-    def begin(self, kind: str, name: str, source: str, poison: bool) -> Iterator[str]:
-        """Write the definition of a robot's own block."""
-        yield f"{kind} {name}[{self.size + 1}];"
-        yield f"for (int k = 0; k < {self._begun}; ++k) {name}[k] = {source}[k];"
-        yield f"for (int k = {self._begun}; k < {self._known}; ++k) {name}[k] = 0;"
+    def begin(self, kind: str, name: str, source: str, step: int, poison: bool) -> Iterator[str]:
+        """Write how a robot's own block begins, whose numbers are so many places apart."""
+        yield f"for (int k = 0; k < {self._begun}; ++k) {name}[k * {step}] = {source}[k];"
+        yield f"for (int k = {self._begun}; k < {self._known}; ++k) {name}[k * {step}] = 0;"
         for k in self._turns:
-            yield f"{name}[{k}] = {name}[{k + 4}] = {name}[{k + 8}] = 1;"
+            yield " = ".join(f"{name}[{(k + c) * step}]" for c in (0, 4, 8)) + " = 1;"
         if poison:
             none = "I(123456789)" if kind == "I" else f"{kind}(NAN)"
-            yield f"for (int k = {self._known}; k < {self.size}; ++k) {name}[k] = {none};"
+            rest = f"int k = {self._known}; k < {self.size}; ++k"
+            yield f"for ({rest}) {name}[k * {step}] = {none};"
+
+
+class _Kind(NamedTuple):
+    """A type of arrays.
+
+    Attributes:
+        item: Type of its numbers.
+        shape: Its shape.
+        own: Whether each robot has one for itself.
+    """
+
+    item: str
+    shape: tuple[int, ...]
+    own: bool
+
+    @property
+    def name(self) -> str:
+        """What it is called in C++."""
+        return "_".join([self.item if self.own else f"{self.item}_of_all", *map(str, self.shape)])
 
 
 def _places(arrays: Sequence[np.ndarray]) -> tuple[dict[int, int], int]:
@@ -200,17 +250,11 @@ def _arrays(record: Record) -> Iterator[tuple[Field, np.ndarray]]:
             yield field, value
 
 
-def _array_types(
-    kinds: Mapping[tuple[str, tuple[int, ...]], str], frozen: Mapping[int, float]
-) -> Iterator[str]:
+def _array_types(kinds: Iterable[_Kind], frozen: Mapping[int, float], step: int) -> Iterator[str]:
     """Write the types of arrays, those with fewer dimensions first: their rows are of those."""
-    wanted = dict(kinds)
-    for item, shape in kinds:
-        for k in range(1, len(shape)):
-            part = shape[k:]
-            wanted.setdefault((item, part), "_".join([item, *map(str, part)]))
-    for (item, shape), name in sorted(wanted.items(), key=lambda kind: len(kind[0][1])):
-        yield _array_type(item, shape, name)
+    wanted = {kind._replace(shape=kind.shape[k:]) for kind in kinds for k in range(len(kind.shape))}
+    for kind in sorted(wanted, key=lambda kind: (len(kind.shape), kind)):
+        yield _array_type(kind, step if kind.own else 1)
     chosen = "".join(f"i == {i} ? real({x!r}) : " for i, x in frozen.items())
     yield (
         "struct Options { const real* p; "
@@ -218,8 +262,10 @@ def _array_types(
     )
 
 
-def _array_type(item: str, shape: Sequence[int], name: str) -> str:
-    steps = [*itertools.accumulate(reversed([*shape[1:], 1]), lambda a, b: a * b)]
+def _array_type(kind: _Kind, step: int) -> str:
+    """Write a type of arrays whose neighbouring numbers are so many places apart."""
+    item, shape, name = kind.item, kind.shape, kind.name
+    steps = [*itertools.accumulate(reversed([*shape[1:], step]), lambda a, b: a * b)]
     steps = list(reversed(steps))
     axes = range(len(shape))
     given = ", ".join(f"I i{k}" for k in axes)
@@ -227,11 +273,12 @@ def _array_type(item: str, shape: Sequence[int], name: str) -> str:
     parts = [
         f"{item}* p;",
         f"CUDA_CALLABLE {item}& operator()({given}) const {{ return p[{place}]; }}",
+        f"CUDA_CALLABLE {item}& at(I k) const {{ return p[k * {step}]; }}",
         f"CUDA_CALLABLE {name} from(I i) const {{ return {name}{{p + i * {steps[0]}}}; }}",
         *(f"CUDA_CALLABLE I n{k}() const {{ return {shape[k]}; }}" for k in axes),
     ]
     for k in range(1, len(shape)):
-        row = "_".join([item, *map(str, shape[k:])])
+        row = kind._replace(shape=shape[k:]).name
         some = ", ".join(f"I i{c}" for c in range(k))
         start = " + ".join(f"i{c} * {steps[c]}" for c in range(k))
         parts.append(
@@ -243,7 +290,6 @@ def _array_type(item: str, shape: Sequence[int], name: str) -> str:
             f"struct {name}_column {{ {item}* p; "
             f"CUDA_CALLABLE {item}& operator()(I i) const {{ return p[i * {steps[0]}]; }} }};\n"
         )
-        parts.append(
-            f"CUDA_CALLABLE {name}_column column(I i) const {{ return {name}_column{{p + i}}; }}"
-        )
+        one = f"{name}_column{{p + i * {step}}}"
+        parts.append(f"CUDA_CALLABLE {name}_column column(I i) const {{ return {one}; }}")
     return f"{column}struct {name} {{ {' '.join(parts)} }};"

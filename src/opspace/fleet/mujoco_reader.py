@@ -11,8 +11,9 @@ import numpy as np
 
 from opspace.errors import InputError, unknown_name
 from opspace.fleet.fleet import Fleet
-from opspace.fleet.task_arrays import TaskArrays
+from opspace.fleet.told_arrays import ToldArrays
 from opspace.fleet.warp_library import warp
+from opspace.tasks import ForceTask
 from opspace.tasks.motion_task import MotionTask
 from opspace.tasks.motions import WorldFrame
 
@@ -105,9 +106,9 @@ class _Frame:
         offset: Of the point from the frame, in its axes, m.
     """
 
-    def __init__(self, arrays: TaskArrays, model: Any, tool: str) -> None:
+    def __init__(self, arrays: ToldArrays, model: Any, tool: str) -> None:
         task = arrays.task
-        if not isinstance(task, MotionTask) or not isinstance(task.source, WorldFrame):
+        if not isinstance(task, MotionTask | ForceTask) or not isinstance(task.source, WorldFrame):
             raise InputError(
                 f"task {arrays.name!r} is not on a frame of the world; write its pose, jacobian and "
                 "drift, and read the others"

@@ -6,8 +6,18 @@ import math
 
 from opspace.command import Status
 from opspace.fleet.integral_sums import forget_sum, learn, push
+from opspace.fleet.led_targets import forget_way, lead, look_at_robot
+from opspace.fleet.wrenches_of_robot import (
+    STALE,
+    forget_no_number,
+    forget_touch,
+    is_stale,
+    press_usable,
+    take_wrenches,
+)
 from opspace.kernels.columns import (
     FIRST_ROW,
+    FORCE,
     GOAL_ACCELERATION,
     GOAL_POSITION,
     GOAL_ROTATION,
@@ -16,16 +26,18 @@ from opspace.kernels.columns import (
     KIND,
     MOTION,
     POSITION,
+    PROFILE,
     QUANTITY,
+    RAMP,
     REMEMBERS,
     ROWS,
     SOLVE,
     SPRING,
     TURN,
 )
-from opspace.kernels.dynamics import evaluate
+from opspace.kernels.compiled_scalars import ramp
 from opspace.kernels.many_states import brake
-from opspace.kernels.motion import P, R, measure, move_joints
+from opspace.kernels.motion import P, R, measure
 from opspace.kernels.task_rows import _quaternion
 from opspace.kernels.tick import tick
 from opspace.tasks.way_round import LARGEST_STEP
@@ -43,6 +55,7 @@ def robot_tick(work, robot):
     """
     _begin(work, robot)
     _find(work, robot)
+    lead(work, robot)
     for i in range(work.kind.shape[0]):
         if work.kind[i, KIND] == MOTION:
             _take_motion(work, robot, i)
@@ -51,17 +64,65 @@ def robot_tick(work, robot):
         elif work.kind[i, KIND] == JOINTS:
             _take_joints(work, robot, i)
     push(work, robot)
+    take_wrenches(work, robot)
+    for i in range(work.kind.shape[0]):
+        if _absent(work, i):
+            _rest(work, i)
     answer = tick(0.0, work)
-    if answer < 0 or not _gains_usable(work, robot):
+    if answer < 0 or not _gains_usable(work, robot) or not _wishes_usable(work, robot):
         brake(work, work.tau)
+        forget_no_number(work)
         robot.status[0], robot.solves[0] = FAULT, 0
     else:
         robot.status[0], robot.solves[0] = answer % SOLVE, answer // SOLVE
+        if robot.status[0] & STALE != 0 and not _any_stale(work):
+            robot.status[0] -= STALE
     learn(work, robot, robot.status[0])
     for i in range(work.kind.shape[0]):
         robot.remembers[i] = work.kind[i, REMEMBERS]
         for c in range(4):
             robot.turn[i, c] = work.numbers[i, TURN + c]
+
+
+def _absent(work, i):
+    """Whether task i is not in this robot's stack, so that nothing about it matters."""
+    x = work.variable[i]
+    value = ramp(0.0, int(x[PROFILE]), x[1], x[2], x[3], x[4], x[5], x[6], x[7], x[8])
+    return x[RAMP] == 0.0 and value == 0.0
+
+
+def _rest(work, i):
+    """Let task i ask for something that is finite."""
+    number = work.numbers[i]
+    for c in range(GOAL_ROTATION, GOAL_ACCELERATION + 6):
+        if not math.isfinite(number[c]):
+            number[c] = 0.0
+    for row in range(work.kind[i, FIRST_ROW], work.kind[i, FIRST_ROW] + work.kind[i, ROWS]):
+        for c in range(3):
+            if not math.isfinite(work.goal[row, c]):
+                work.goal[row, c] = 0.0
+
+
+def _any_stale(work):
+    """Whether a force task in this robot's stack has had no new wrench for too long."""
+    stale = False
+    for i in range(work.kind.shape[0]):
+        if is_stale(work, i) and not _absent(work, i):
+            stale = True
+    return stale
+
+
+def _wishes_usable(work, robot):
+    """Whether all that tasks ask for is finite; where nothing is left to them, no torque shows that."""
+    for i in range(work.kind.shape[0]):
+        if _absent(work, i):
+            continue
+        if work.kind[i, KIND] == FORCE and not press_usable(work, robot, i):
+            return False
+        for row in range(work.kind[i, FIRST_ROW], work.kind[i, FIRST_ROW] + work.kind[i, ROWS]):
+            if not math.isfinite(work.fw[row]):
+                return False
+    return True
 
 
 def _gains_usable(work, robot):
@@ -86,6 +147,8 @@ def _begin(work, robot):
         if robot.epoch[i] != robot.seen[i]:
             robot.remembers[i] = 0
             forget_sum(work, robot, i)
+            forget_way(work, robot, i)
+            forget_touch(work, i)
             robot.found[i] = robot.holds[i]
             robot.seen[i] = robot.epoch[i]
         work.kind[i, REMEMBERS] = robot.remembers[i]
@@ -101,8 +164,7 @@ def _find(work, robot):
             any_task = True
     if not any_task:
         return
-    evaluate(work.bodies, work.q, work.v, work.dynamics)
-    move_joints(work)
+    look_at_robot(work)
     for i in range(work.kind.shape[0]):
         if robot.found[i] == 0:
             continue

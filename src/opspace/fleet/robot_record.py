@@ -6,6 +6,7 @@ from functools import partial
 
 import numpy as np
 
+from opspace.fleet.led_targets import TOLD_SIZE, WAY_SIZE
 from opspace.machine.field_table import Field, RecordTable
 
 _given = partial(Field, writer="caller")
@@ -35,6 +36,14 @@ ROBOT = RecordTable(
     _given("max_integral", ("tasks",), "error whose pull the integral adds at most", "m, rad"),
     _given("integral", ("tasks", 6), "what it adds to tasks of motion", "m/s², rad/s²"),
     _given("joint_integral", ("rows",), "what it adds to tasks of joints", "rad/s², m/s²"),
+    _given("wrench", ("tasks", 6), "measured wrench of force tasks, on the environment", "N, N·m"),
+    _given(
+        "contact",
+        ("tasks", 2),
+        "forces between which confidence rises, or 0",
+        "N",
+    ),
+    _whole("fresh", ("tasks",), "whether it has been measured since the tick before"),
     _given("learned", ("rows",), "errors that it adds up in this tick", "m, rad"),
     _given("since", (1,), "time since the tick before", "s"),
     _whole("epoch", ("tasks",), "how often the task has begun, as its owner counts"),
@@ -47,4 +56,22 @@ ROBOT = RecordTable(
     _given("joint_before", ("rows",), "joint targets of the tick before", "rad, m"),
     _whole("status", (1,), "what happened, in the numbers of `opspace.Status`"),
     _whole("solves", (1,), "hard torques that were computed"),
+)
+
+WAYS = RecordTable(
+    "Ways",
+    "The ways of one robot of a fleet to new targets, of all its tasks where any has one.",
+    _given("pace", ("ways", 4), "speed and acceleration of a task's ways, of a turn after that"),
+    _given("age", ("ways",), "time since its way began", "s"),
+    _given("told", ("ways", TOLD_SIZE), "what a task of motion was told last"),
+    _given("goal", ("ways", TOLD_SIZE), "what it is told in this tick"),
+    _given("parts", ("ways", 6, WAY_SIZE), "its way, three coordinates of place and three of turn"),
+    _given("turned", ("ways", 4), "orientation where that began, quaternion wxyz"),
+    _given("place", ("ways", 6, 3), "where it is beside that, its speed and acceleration"),
+    _given("joint_told", ("way_rows", 3), "what tasks of joints were told last", "rad, m"),
+    _given("joint_parts", ("way_rows", WAY_SIZE), "their ways"),
+    _given("joint_place", ("way_rows", 3), "where they are, as ``place``", "rad, m"),
+    _whole("known", ("ways",), "whether the task has been told anything since it began"),
+    _whole("led", ("ways",), "whether it is on a way or has come to its end"),
+    _whole("begins", ("ways",), "whether that begins in this tick"),
 )

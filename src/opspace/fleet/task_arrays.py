@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from opspace.errors import InputError
+from opspace.fleet.led_targets import TOLD_SIZE, WAY_SIZE
+from opspace.fleet.told_arrays import ToldArrays, write_rows
 from opspace.fleet.warp_library import robots_of, warp
 from opspace.kernels.columns import (
     GOAL_ACCELERATION,
@@ -31,7 +33,7 @@ START = {ORIENTATION: 3}
 """Where the target of a quantity begins among position and quaternion; others at the first."""
 
 
-class TaskArrays:
+class TaskArrays(ToldArrays):
     """One task of every robot of a fleet.
 
     Every array is on the device of the fleet, has one row per robot and stays where it is, so that
@@ -57,6 +59,8 @@ class TaskArrays:
         stiffness: (m,) K, N/m, N·m/rad.
         damping_ratio: ζ, 1 is critical.
         force: (m,) force on the environment beside the spring's, N, N·m.
+        is_paced: Whether it goes to new targets on ways: a task with a ``max_acceleration``.
+        begun: When the way of each robot began, s.
         told_motion: Whether it is told the three that follow: a task of motion in a fleet that is given
             the dynamics.
         pose: (7,) position and quaternion wxyz of what the task controls.
@@ -65,13 +69,10 @@ class TaskArrays:
     """
 
     def __init__(self, task: TrackingTask, count: int, dtype: Any, device: Any) -> None:
-        self.task = task
-        self.name = task.name
-        self._count, self._dtype, self._device = count, dtype, device
+        super().__init__(task, count, dtype, device)
         self._size = 0
         self._joints = False
-        self.told_motion = False
-        self.is_spring = self.integrates = False
+        self.is_spring = False
         self._start = 0
         self._wishes = np.full(count, task.target is None)
 
@@ -86,6 +87,7 @@ class TaskArrays:
         """
         if self._size:
             return
+        super().begin(tick, i, rows, given=given and tick.kind[i, KIND] != JOINTS)
         kind, number = tick.kind[i], tick.numbers[i]
         m = rows.stop - rows.start
         if kind[KIND] == JOINTS:
@@ -109,36 +111,36 @@ class TaskArrays:
                 self.stiffness = self._filled(self.task.stiffness)
                 self.damping_ratio = self._filled(np.array(self.task.damping_ratio))
                 self.force = self._filled(self.task.force)
-            if given:
-                self.told_motion = True
-                self.pose = self._filled(np.eye(7)[3])
-                self.jacobian = self._filled(np.zeros((6, tick.v.size)))
-                self.drift = self._filled(np.zeros(6))
+        if self.task.max_acceleration is not None and self.task.target is not None:
+            # The plan has what the task follows, which is the beginning of a way.
+            target = self._rows(cast("ArrayLike", self.task.target), 1)[0]
         self.target, self.velocity, self.acceleration = map(
             self._filled, (target, velocity, acceleration)
         )
-        self.kp, self.kv = self._filled(tick.kp[rows]), self._filled(tick.kv[rows])
+        self.kp = self._filled(tick.kp[rows])
         if self.task.ki is not None:
             self.integrates = True
             self.ki = self._filled(np.array(self.task.ki))
             self.max_integral = self._filled(np.array(self.task._max_integral))
             self.integral = self._filled(np.zeros(self.acceleration.shape[1]))
-        one = np.ones(())
-        self.activation, self.presence = self._filled(one), self._filled(one)
-        self.error = self._filled(np.zeros(m))
         self._turn, self._before = self._filled(np.zeros(4)), self._filled(np.zeros(4))
         self._joint_before = self._filled(np.zeros(m))
-        self._remembers, self._seen = self._filled(0), self._filled(-1)
-        self._epoch = self._filled(0)
+        if self.task.max_acceleration is not None:
+            self._begin_ways(m)
+        self._remembers = self._filled(0)
         self._holds = self._filled(0)
         self._holds.assign(self._wishes.astype(np.int64))
 
-    def __repr__(self) -> str:
-        return f"TaskArrays({self.name!r} of {self._count} robots on {self._device})"
-
-    def begin_again(self, epoch: np.ndarray) -> None:
-        """Tell how often the task has begun with each robot, (count,)."""
-        self._epoch.assign(epoch)
+    def _begin_ways(self, rows: int) -> None:
+        """Make what a task that goes on ways remembers of them."""
+        wp = warp()
+        self.is_paced = True
+        self._known, self._led = self._filled(0), self._filled(0)
+        nothing = np.zeros((rows, 3)) if self._joints else np.eye(TOLD_SIZE)[3]  # a turn by nothing
+        self._told = self._filled(nothing, wp.float64)
+        self._way = self._filled(np.zeros((rows if self._joints else 6, WAY_SIZE)), wp.float64)
+        self._turned = self._filled(np.eye(4)[0], wp.float64)
+        self.begun = wp.zeros(self._count, dtype=wp.float64, device=self._device)
 
     def set_target(
         self,
@@ -164,7 +166,7 @@ class TaskArrays:
         for array, given in ((self.velocity, velocity), (self.acceleration, acceleration)):
             told.append((array, self._checked(0.0 if given is None else given, array, mask)))
         for array, row in told:
-            _write(array, row, mask)
+            write_rows(array, row, mask)
         self._wishes &= ~mask
         self._holds.assign(self._wishes.astype(np.int64))
 
@@ -189,59 +191,67 @@ class TaskArrays:
         damping = critical if kv is None else self._checked(kv, self.kv, mask)
         if (stiffness < 0.0).any() or (damping < 0.0).any():
             raise InputError(f"task {self.name!r}: gains must be at least 0")
-        _write(self.kp, stiffness, mask)
-        _write(self.kv, damping, mask)
+        write_rows(self.kp, stiffness, mask)
+        write_rows(self.kv, damping, mask)
 
-    def places(self, i: int, rows: slice) -> Iterator[tuple[str, Any, str]]:
-        """List the arrays, which way each goes, and where it is in the memory of one robot's tick."""
+    def places(self, i: int, rows: slice) -> Iterator[tuple[str, Any, str, int]]:
+        """List the arrays, which way each goes, and where it is: in which array of one robot's tick."""
         first = rows.start
+        yield from super().places(i, rows)
         for name in ("target", "velocity", "acceleration"):
             width = 7 if name == "target" else 6
             start = self._start if name == "target" else 0
-            place = f"robot.{name}_().p + {i * width + start}"
-            if self._joints:
-                place = f"robot.joint_{name}_().p + {first}"
             way = "in, out where found" if name == "target" else "in"
-            yield way, getattr(self, name), f"({place})"
-        for name in ("pose", "jacobian", "drift") if self.told_motion else ():
-            array = getattr(self, name)
-            yield "in", array, f"(robot.{name}_().p + {i * int(np.prod(array.shape[1:]))})"
+            if self._joints:
+                yield way, getattr(self, name), f"robot.joint_{name}_()", first
+            else:
+                yield way, getattr(self, name), f"robot.{name}_()", i * width + start
         if self.integrates:
-            place = f"joint_integral_().p + {first}" if self._joints else f"integral_().p + {6 * i}"
-            yield "in", self.ki, f"(robot.ki_().p + {i})"
-            yield "in", self.max_integral, f"(robot.max_integral_().p + {i})"
-            yield "in, out", self.integral, f"(robot.{place})"
+            place = ("joint_integral", first) if self._joints else ("integral", 6 * i)
+            yield "in", self.ki, "robot.ki_()", i
+            yield "in", self.max_integral, "robot.max_integral_()", i
+            yield "in, out", self.integral, f"robot.{place[0]}_()", place[1]
+        if self.is_paced:
+            yield from self._ways(i, first)
         if self.is_spring:
-            yield "in", self.stiffness, f"(robot.stiffness_().p + {first})"
-            yield "in", self.force, f"(robot.spring_force_().p + {first})"
-            yield "in", self.damping_ratio, f"(robot.damping_ratio_().p + {i})"
+            yield "in", self.stiffness, "robot.stiffness_()", first
+            yield "in", self.force, "robot.spring_force_()", first
+            yield "in", self.damping_ratio, "robot.damping_ratio_()", i
         else:
-            yield "in", self.kp, f"(work.kp_().p + {first})"
-            yield "in", self.kv, f"(work.kv_().p + {first})"
-        yield "in", self.activation, f"(work.own_().p + {i})"
-        yield "out", self.presence, f"(work.h_().p + {i})"
-        yield "out", self.error, f"(work.error_().p + {first})"
-        yield "in", self._epoch, f"(robot.epoch_().p + {i})"
-        yield "in", self._holds, f"(robot.holds_().p + {i})"
-        yield "in, out", self._seen, f"(robot.seen_().p + {i})"
-        yield "in, out", self._remembers, f"(robot.remembers_().p + {i})"
-        yield "in, out", self._turn, f"(robot.turn_().p + {4 * i})"
+            yield "in", self.kp, "work.kp_()", first
+            yield "in", self.kv, "work.kv_()", first
+        yield "in", self._holds, "robot.holds_()", i
+        yield "in, out", self._remembers, "robot.remembers_()", i
+        yield "in, out", self._turn, "robot.turn_()", 4 * i
         if self._joints:
-            yield "in, out", self._joint_before, f"(robot.joint_before_().p + {first})"
+            yield "in, out", self._joint_before, "robot.joint_before_()", first
         else:
-            yield "in, out", self._before, f"(robot.before_().p + {4 * i})"
+            yield "in, out", self._before, "robot.before_()", 4 * i
 
-    def _filled(self, row: ArrayLike) -> Any:
-        """Make an array with the same row for every robot."""
-        wp = warp()
-        found = np.asarray(row)
-        whole = np.broadcast_to(found, (self._count, *found.shape))
-        dtype = wp.int64 if found.dtype.kind == "i" else self._dtype
-        return wp.array(whole, dtype=dtype, device=self._device)
+    @property
+    def paces(self) -> list[float]:
+        """Speed and acceleration of the task's ways, those of a turn after those of a position; or 0."""
+        task = self.task
+        if not self.is_paced:
+            return [0.0] * 4
+        speeds, accelerations = np.atleast_1d(task.max_speed), np.atleast_1d(task.max_acceleration)
+        return np.resize(np.stack((speeds, accelerations), axis=1), 4).tolist()
+
+    def _ways(self, i: int, first: int) -> Iterator[tuple[str, Any, str, int]]:
+        """List what a task with a ``max_acceleration`` remembers of its ways."""
+        yield "in, out", self._known, "work.ways_().known_()", i
+        yield "in, out", self._led, "work.ways_().led_()", i
+        if self._joints:
+            yield "in, out", self._told, "work.ways_().joint_told_()", 3 * first
+            yield "in, out", self._way, "work.ways_().joint_parts_()", WAY_SIZE * first
+        else:
+            yield "in, out", self._told, "work.ways_().told_()", TOLD_SIZE * i
+            yield "in, out", self._way, "work.ways_().parts_()", 6 * WAY_SIZE * i
+            yield "in, out", self._turned, "work.ways_().turned_()", 4 * i
 
     def _rows(self, value: ArrayLike, count: int) -> np.ndarray:
         found = numbers(value, f"task {self.name!r}: target")
-        if found.shape == (count, self._size) and found.shape != (3, 3):
+        if found.shape == (count, self._size):
             turn = found[:, 3 - self._start :] if self._size != 3 and not self._joints else None
             lengths = np.ones(1) if turn is None else np.linalg.norm(turn, axis=1)
             if not np.isfinite(found).all() or not (abs(lengths - 1.0) < 1e-3).all():
@@ -255,21 +265,3 @@ class TaskArrays:
         turn = np.array(quaternion_from_matrix(goal[:3, :3]))
         row = np.concatenate([goal[:3, 3], turn]) if self._size == 7 else turn
         return np.broadcast_to(row, (count, self._size))
-
-    def _checked(self, value: ArrayLike, array: Any, mask: np.ndarray) -> np.ndarray:
-        what = f"task {self.name!r}: {value!r}"
-        found = numbers(value, what)
-        shape = (int(mask.sum()), *array.shape[1:])
-        try:
-            found = np.broadcast_to(found, shape)
-        except ValueError:
-            raise InputError(f"{what} has shape {found.shape}, not {shape}") from None
-        if not np.isfinite(found).all():
-            raise InputError(f"{what} must be finite")
-        return found
-
-
-def _write(array: Any, rows: np.ndarray, mask: np.ndarray) -> None:
-    whole = array.numpy().copy()
-    whole[mask] = rows
-    array.assign(whole)

@@ -84,6 +84,29 @@ def _of_numpy(given: np.ndarray, name: str, dtype: Any, device: Any) -> Any:
     return wp.array(given, dtype=dtype, device=device, copy=False)
 
 
+def workspace_of(count: int, memory: int, lanes: int, device: Any) -> Any:
+    """Make the memory that robots work in, for whole groups of as many as share a part.
+
+    Args:
+        count: Number of robots.
+        memory: Bytes of each, a multiple of 8.
+        lanes: How many share a part.
+        device: Where it shall be.
+
+    Raises:
+        InputError: The device has not so much.
+    """
+    wp, groups = warp(), -(-count // lanes)
+    try:
+        return wp.empty((groups, lanes * memory // 8), dtype=wp.int64, device=device)
+    except RuntimeError as error:
+        size = groups * lanes * memory / 2**20
+        raise InputError(
+            f"{count} of these robots work in {size:.0f} MiB, which {device} has not free; make the "
+            "fleet smaller, or give its stack fewer rows and levels"
+        ) from error
+
+
 def robots_of(robots: Any, count: int) -> np.ndarray:
     """Return which robots are meant, (count,) of bool.
 

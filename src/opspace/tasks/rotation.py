@@ -158,3 +158,42 @@ def as_rotation(value: ArrayLike, what: str) -> Array:
         )
     R.flags.writeable = False
     return R
+
+
+def turning_rates(phi: Array, rate: Array, curvature: Array) -> tuple[Array, Array]:
+    """Return ω = V φ̇ and ω̇ = V φ̈ + V̇ φ̇ of R = exp([φ]×) R_0, with V = I + a [φ]× + b [φ]×².
+
+    Args:
+        phi: (3,) rotation vector φ in world axes, rad.
+        rate: (3,) φ̇, rad/s.
+        curvature: (3,) φ̈, rad/s².
+    """
+    a, b, a_rate, b_rate = _turning(math.sqrt(float(phi @ phi)), float(phi @ rate))
+    once, bent = cross(phi, rate), cross(phi, curvature)
+    twice = cross(phi, once)
+    omega = rate + a * once + b * twice
+    alpha = curvature + a * bent + b * cross(phi, bent)
+    alpha += a_rate * once + b_rate * twice + b * cross(rate, once)
+    return omega, alpha
+
+
+_SERIES_BELOW = 1e-2
+"""Angle in rad below which series are more accurate than differences of near numbers."""
+
+
+def _turning(angle: float, growth: float) -> tuple[float, float, float, float]:
+    """Return a = (1 − cos θ)/θ², b = (θ − sin θ)/θ³ and their rates, with growth = θ θ̇."""
+    square = angle * angle
+    if angle < _SERIES_BELOW:
+        a, b = 0.5 - square / 24.0, 1.0 / 6.0 - square / 120.0
+        return (
+            a,
+            b,
+            growth * (-1.0 / 12.0 + square / 180.0),
+            growth * (-1.0 / 60.0 + square / 1260.0),
+        )
+    sine, cosine = math.sin(angle), math.cos(angle)
+    a, b = (1.0 - cosine) / square, (angle - sine) / (square * angle)
+    a_rate = growth * (sine / angle - 2.0 * a) / square
+    b_rate = growth * (a - 3.0 * b) / square
+    return a, b, a_rate, b_rate

@@ -2,18 +2,13 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple, Protocol, TypeVar
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from opspace.errors import InputError
-from opspace.tasks.references import (
-    JerkLimited,
-    OrientationJerkLimited,
-    PoseReference,
-    Sample,
-)
-from opspace.tasks.rotation import log_rotation
+from opspace.law.swift_motion import swift_at, swift_motion, swift_time
+from opspace.tasks.references import PoseReference, Sample
+from opspace.tasks.rotation import exp_rotation, log_rotation, turning_rates
 from opspace.tasks.validation import Array
 
 JERK_TIME = 0.1
@@ -31,14 +26,6 @@ class Pace(NamedTuple):
     speed: float
     acceleration: float
 
-    def limits(self) -> dict[str, float]:
-        """Return them as `JerkLimited` takes them."""
-        return {
-            "max_velocity": self.speed,
-            "max_acceleration": self.acceleration,
-            "max_jerk": self.acceleration / JERK_TIME,
-        }
-
 
 class Way(Protocol):
     """A reference that arrives.
@@ -54,6 +41,41 @@ class Way(Protocol):
         ...
 
 
+class SwiftWay:
+    """The way from nowhere to a vector, each coordinate as fast as the limits allow.
+
+    The first coordinate is along the vector, the others across it; these only come to rest.
+
+    Args:
+        way: (k,) where it goes.
+        velocity: (k,) at its beginning.
+        acceleration: (k,) at its beginning.
+        pace: Its limits.
+
+    Attributes:
+        duration: How long it takes, s.
+    """
+
+    def __init__(self, way: Array, velocity: Array, acceleration: Array, pace: Pace) -> None:
+        self._axes = _axes_along(way)
+        self._limits = most, jerk = pace.acceleration, pace.acceleration / JERK_TIME
+        self._parts: list[tuple[float, float, float, float, float]] = []
+        self._ends: list[tuple[float, float]] = []
+        for d, v, a in (np.stack((way, velocity, acceleration), axis=1).T @ self._axes).T.tolist():
+            plan = swift_motion(d, v, a, pace.speed, most, jerk)
+            self._parts.append((*plan, v, a))
+            self._ends.append((swift_time(*plan, v, a, most, jerk), d))
+        self.duration = max(end for end, _ in self._ends)
+
+    def __call__(self, elapsed: float) -> Sample:
+        """Return position, velocity and acceleration a time after its beginning, s."""
+        found = [
+            swift_at(elapsed, *parts, *self._limits) if elapsed < end else (d, 0.0, 0.0)
+            for parts, (end, d) in zip(self._parts, self._ends, strict=True)
+        ]
+        return Sample(*(self._axes @ np.array(found)).T)
+
+
 class VectorWay:
     """Goes to a value, with the limits along the straight way and across it.
 
@@ -65,22 +87,20 @@ class VectorWay:
     """
 
     def __init__(self, now: Sample, goal: Array, t: float, pace: Pace) -> None:
-        self._start, self.goal = now.x, goal
-        self._axes = _axes_along(goal - now.x)
-        back = self._axes.T
-        way, rates = back @ (goal - now.x), (back @ now.v, back @ now.a)
-        self._motion = _begun_gently(JerkLimited, np.zeros(goal.size), way, rates, t, pace)
+        self._start, self.goal, self._begin = now.x, goal, t
+        self._motion = SwiftWay(goal - now.x, now.v, now.a, pace)
         self.end = t + self._motion.duration
 
     def __call__(self, t: float, /) -> Sample:
         """Return the desired motion at time t, s."""
-        y, v, a = self._motion(t)
-        x = self.goal if t >= self.end else self._start + self._axes @ y
-        return Sample(x, self._axes @ v, self._axes @ a)
+        if t >= self.end:
+            return Sample(self.goal, np.zeros(self.goal.size), np.zeros(self.goal.size))
+        x, v, a = self._motion(t - self._begin)
+        return Sample(self._start + x, v, a)
 
 
 class RotationWay:
-    """Turns to an orientation the short way, with the limits about the axis of the turn and across it.
+    """Turns to an orientation the short way: R = exp([φ(t)]×) R_now, with φ on a `SwiftWay`.
 
     Args:
         now: What is followed at its beginning: (3, 3) rotation matrix, (3,) and (3,) rates.
@@ -90,17 +110,17 @@ class RotationWay:
     """
 
     def __init__(self, now: Sample, goal: Array, t: float, pace: Pace) -> None:
-        self.goal = goal
-        W = self._axes = _axes_along(log_rotation(goal @ now.x.T))
-        start, end = W.T @ now.x @ W, W.T @ goal @ W
-        rates = (W.T @ now.v, W.T @ now.a)
-        self._motion = _begun_gently(OrientationJerkLimited, start, end, rates, t, pace)
-        self.end = t + self._motion.duration
+        self._start, self.goal, self._begin = now.x, goal, t
+        self._turn = SwiftWay(log_rotation(goal @ now.x.T), now.v, now.a, pace)
+        self.end = t + self._turn.duration
 
     def __call__(self, t: float, /) -> Sample:
         """Return the desired motion at time t, s."""
-        W, (R, omega, alpha) = self._axes, self._motion(t)
-        return Sample(self.goal if t >= self.end else W @ R @ W.T, W @ omega, W @ alpha)
+        if t >= self.end:
+            return Sample(self.goal, np.zeros(3), np.zeros(3))
+        phi, rate, curvature = self._turn(t - self._begin)
+        omega, alpha = turning_rates(phi, rate, curvature)
+        return Sample(exp_rotation(phi) @ self._start, omega, alpha)
 
 
 class PoseWay(PoseReference):
@@ -122,26 +142,6 @@ class PoseWay(PoseReference):
         super().__init__(position, orientation)
         self.goal = goal
         self.end = max(position.end, orientation.end)
-
-
-Motion = TypeVar("Motion", JerkLimited, OrientationJerkLimited)
-
-
-def _begun_gently(
-    kind: type[Motion], start: Array, goal: Array, rates: tuple[Array, Array], t: float, pace: Pace
-) -> Motion:
-    """Make a motion that begins with these rates, or from rest where none within the limits does."""
-    try:
-        return kind(
-            start,
-            goal,
-            **pace.limits(),
-            start_time=t,
-            start_velocity=rates[0],
-            start_acceleration=rates[1],
-        )
-    except InputError:
-        return kind(start, goal, **pace.limits(), start_time=t)
 
 
 def _axes_along(way: Array) -> Array:

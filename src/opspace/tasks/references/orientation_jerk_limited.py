@@ -2,19 +2,13 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 from numpy.typing import ArrayLike
 
 from opspace.tasks.references.jerk_limited import JerkLimited
 from opspace.tasks.references.sample import Sample
 from opspace.tasks.references.start import Started, optional_time
-from opspace.tasks.rotation import as_rotation, cross, exp_rotation, log_rotation
-from opspace.tasks.validation import Array
-
-_SERIES_BELOW = 1e-2
-"""Angle in rad below which series are more accurate than differences of near numbers."""
+from opspace.tasks.rotation import as_rotation, exp_rotation, log_rotation, turning_rates
 
 
 class OrientationJerkLimited(Started):
@@ -72,35 +66,6 @@ class OrientationJerkLimited(Started):
         """Return the desired rotation matrix, angular velocity and acceleration at time t, s."""
         elapsed = self.elapsed(t)
         phi, rate, curvature = self._turn(elapsed)
-        omega, alpha = _angular(phi, rate, curvature)
+        omega, alpha = turning_rates(phi, rate, curvature)
         R = self.goal if elapsed >= self.duration else exp_rotation(phi) @ self.start
         return Sample(R, omega, alpha)
-
-
-def _angular(phi: Array, rate: Array, curvature: Array) -> tuple[Array, Array]:
-    """Return ω = V φ̇ and ω̇ = V φ̈ + V̇ φ̇ with V = I + a [φ]× + b [φ]×²."""
-    a, b, a_rate, b_rate = _coefficients(math.sqrt(float(phi @ phi)), float(phi @ rate))
-    once, bent = cross(phi, rate), cross(phi, curvature)
-    twice = cross(phi, once)
-    omega = rate + a * once + b * twice
-    alpha = curvature + a * bent + b * cross(phi, bent)
-    alpha += a_rate * once + b_rate * twice + b * cross(rate, once)
-    return omega, alpha
-
-
-def _coefficients(angle: float, growth: float) -> tuple[float, float, float, float]:
-    """Return a = (1 − cos θ)/θ², b = (θ − sin θ)/θ³ and their rates, with growth = θ θ̇."""
-    square = angle * angle
-    if angle < _SERIES_BELOW:
-        a, b = 0.5 - square / 24.0, 1.0 / 6.0 - square / 120.0
-        return (
-            a,
-            b,
-            growth * (-1.0 / 12.0 + square / 180.0),
-            growth * (-1.0 / 60.0 + square / 1260.0),
-        )
-    sine, cosine = math.sin(angle), math.cos(angle)
-    a, b = (1.0 - cosine) / square, (angle - sine) / (square * angle)
-    a_rate = growth * (sine / angle - 2.0 * a) / square
-    b_rate = growth * (a - 3.0 * b) / square
-    return a, b, a_rate, b_rate
