@@ -20,7 +20,6 @@ from opspace.law.contact_forces import (
     Room,
     Wish,
     free_motions,
-    realise,
     share,
 )
 from opspace.law.scalars import (
@@ -124,7 +123,7 @@ def stand(
     apart = (np.zeros((0, k.v.size)), NOTHING, NOTHING)
     if distances is not None:
         apart = (distances.G, distances.most, distances.softness(k.M))
-    found = realise(wish, carrying, Room(bounds.lower, bounds.upper, room, *apart))
+    found = rules.realise(wish, carrying, Room(bounds.lower, bounds.upper, room, *apart))
     if rules.observer is not None:
         rules.observer.remember(k.t, k.v, found.acceleration)
     weight = float(np.linalg.norm(k.robot.gravity[:3]))
