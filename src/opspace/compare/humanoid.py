@@ -107,7 +107,7 @@ VARIANTS: Mapping[str, Variant] = MappingProxyType(
             partial(ReferenceController, law=ten_to_one),
         ),
         "hierarchy": Variant(
-            "strict priorities by one quadratic program per level, weights and forces ramped",
+            "strict priorities by one quadratic program per level; the forces of contacts are ramped",
             {},
             StrictProgramController,
             "daqp",

@@ -109,7 +109,7 @@ METHODS: Mapping[str, Method] = MappingProxyType(
             stands=False,
         ),
         "hierarchy": Method(
-            "strict priorities by one quadratic program per level, weights and forces ramped",
+            "strict priorities by one quadratic program per level; the forces of contacts are ramped",
             "cones, motors and joints are hard in every program",
             StrictProgramController,
             installed=daqp_installed,

@@ -210,12 +210,11 @@ class StrictProgram:
 
         contacts   min ‖J q̈ − γ‖²
         joints     min ‖excess over their accelerations‖², which is all they get from there on
-        a level    min Σ_k h_k ‖Ĵ_k x − f_k‖²
+        a level    min Σ_k ‖Ĵ_k x − f_k‖² over its tasks with h_k > 0
         forces     min Σ_c ‖λ_c − λ_ref,c‖²_R
 
-    h_k weighs tasks of one level against each other. To a task that nothing in its level contradicts it
-    makes no difference before it is 0: weights lead from one compromise to another, not from one
-    hierarchy to another.
+    What can be ramped is the largest force of a contact. A task is there or not: to weigh its rows by
+    h_k makes no difference to a task that nothing in its level contradicts, before h_k is 0.
     """
 
     def __init__(self) -> None:
@@ -252,12 +251,10 @@ def _levels(
     h = presences(asked.corners, len(asked.task_sets))
     white = whiten(asked.task_sets, asked.L)
     for level in levels_of(asked.task_sets):
-        members = [k for k in sorted(level.members) if h[k] > 0.0]
-        if not members or (limited and level.priority == TOP):
-            continue
-        J, f = stack_rows(white, members)
-        size = np.sqrt(np.concatenate([np.full(white[k].f.size, h[k]) for k in members]))
-        yield level.priority, body.motion(size[:, None] * J), size * f
+        there = [k for k in level.members if h[k] > 0.0]
+        if there and not (limited and level.priority == TOP):
+            J, f = stack_rows(white, there)
+            yield level.priority, body.motion(J), f
 
 
 class StrictProgramController(ReferenceController):

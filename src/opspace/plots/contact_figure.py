@@ -27,8 +27,8 @@ TITLES: Mapping[str, str] = {
     "switch": "hard switch",
     "weighted": "weighted QP",
     "weighted-switch": "switched weights",
-    "hierarchy": "strict QPs, ramped",
-    "hierarchy-switch": "strict QPs, switched",
+    "hierarchy": "strict QPs",
+    "hierarchy-switch": "switched QPs",
 }
 LOWEST = 1e-4
 """Where a torque step counts as none, N·m."""
