@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from opspace.command import LevelStatus as LevelStatus
     from opspace.command import Status as Status
     from opspace.command import TaskStatus as TaskStatus
+    from opspace.contacts import EdgeContact as EdgeContact
     from opspace.contacts import GroundContact as GroundContact
     from opspace.contacts import PointContact as PointContact
     from opspace.contacts import SoleContact as SoleContact
@@ -126,7 +127,7 @@ if TYPE_CHECKING:
 
 _NAMES = {
     "opspace.command": "Command ContactStatus Distance LevelStatus Status TaskStatus",
-    "opspace.contacts": "GroundContact PointContact SoleContact",
+    "opspace.contacts": "EdgeContact GroundContact PointContact SoleContact",
     "opspace.controller": "Controller",
     "opspace.controller.falling": "FallRule",
     "opspace.errors": (

@@ -310,6 +310,9 @@ def _reproduce_humanoid(robot: str | None, out: Path) -> None:
     for name, run in runs.items():
         ended = "" if run.outcome.completed else f", stopped at {run.outcome.t:.2f} s"
         print(f"{name}: {VARIANTS[name].title}{ended}")
+    for name, variant in VARIANTS.items():
+        if name not in runs:
+            print(f"{name} is left out: {variant.needs} is not installed", file=sys.stderr)
     with counter("film.gif") as pictures:
         for problem in draw(runs, out, progress=pictures):
             print(problem, file=sys.stderr)

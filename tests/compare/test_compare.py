@@ -168,3 +168,10 @@ def test_a_robot_that_stands_is_measured_with_the_forces_of_its_contacts():
     assert "cbf-qp" in usable_methods(short())
     with pytest.raises(InputError, match="knows no contacts"):
         compare_scenario(scenario, ["cbf-qp"])
+
+
+def test_tsid_refuses_a_robot_that_stands_by_name():
+    standing = build(load_scenario("humanoid"), METHODS["tsid"].controller)
+    assert "tsid" not in usable_methods(load_scenario("humanoid"))
+    with pytest.raises(InputError, match="tsid knows no contacts, and robot 'g1'"):
+        standing.controller.step(0.0, standing.plant.q, standing.plant.v)

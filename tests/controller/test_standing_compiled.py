@@ -1,6 +1,7 @@
 """A robot that stands: the compiled tick against the readable one."""
 
 import pickle
+from functools import partial
 
 import numpy as np
 import pytest
@@ -17,7 +18,7 @@ SOFT_ACCURACY = 1e-3
 """Where limits contradict each other, their softness makes the equations that badly conditioned."""
 
 
-def humanoid(ankle, half, offset, hand):
+def humanoid(ankle, half, offset, hand, rests=osc.PointContact):
     """Two soles that stand, and a hand that may come, with what such a robot does."""
 
     def make():
@@ -25,7 +26,7 @@ def humanoid(ankle, half, offset, hand):
             osc.SoleContact(ankle.format(side), half, offset=offset, name=side)
             for side in ("left", "right")
         ]
-        wall = osc.PointContact(hand, normal=(-1.0, 0.0, 0.2), force=20.0, name="wall")
+        wall = rests(hand, normal=(-1.0, 0.0, 0.2), force=20.0, name="wall")
         tasks = [
             osc.ComTask(kp=50.0),
             [osc.PositionTask(hand, name="hand"), osc.AngularMomentumTask()],
@@ -45,7 +46,13 @@ def quadruped():
 
 ROBOTS = {
     "g1": humanoid("{}_ankle_roll_link", HALF, OFFSET, "right_rubber_hand"),
-    "talos": humanoid("{}_sole_link", (0.1, 0.06), (0.0, 0.0, 0.0), "wrist_left_ft_tool_link"),
+    "talos": humanoid(
+        "{}_sole_link",
+        (0.1, 0.06),
+        (0.0, 0.0, 0.0),
+        "wrist_left_ft_tool_link",
+        partial(osc.EdgeContact, half=0.05, along=(0.2, 1.0, 0.3), offset=(0.0, 0.01, 0.05)),
+    ),
     "solo12": quadruped,
 }
 

@@ -8,7 +8,14 @@ import pytest
 from scipy.optimize import nnls
 
 from opspace.law import TaskSet, corners, task_torque
-from opspace.law.cones import point_cone, point_metric, sole_cone, sole_metric
+from opspace.law.cones import (
+    edge_cone,
+    edge_metric,
+    point_cone,
+    point_metric,
+    sole_cone,
+    sole_metric,
+)
 from opspace.law.contact_forces import NEARNESS, ForceSet, Room, Wish, free_motions, realise, share
 
 BASE = 6
@@ -351,28 +358,48 @@ def test_in_flight_the_base_falls_and_the_joints_do_what_they_can():
 
 
 def test_the_cone_of_a_sole_is_what_four_corners_carry():
-    """A wrench is inside exactly if forces at the corners, each in its pyramid, add up to it."""
-    rng = np.random.default_rng(0)
     X, Y = HALF
-    C = sole_cone(HALF, MU)
+    corners = [(x, y, 0.0) for x, y in product((X, -X), (Y, -Y))]
+    inside = carried_alike(sole_cone(HALF, MU), corners, range(6), sole_metric(HALF, MU))
+    assert 300 < inside < 1200
+
+
+def carried_alike(cone, corners, held, metric):
+    """Of 1500 wrenches, count those inside: exactly those to which forces at the corners add up."""
+    rng = np.random.default_rng(0)
     edges = np.array([(a * MU, b * MU, 1.0) for a, b in product((1, -1), repeat=2)])
-    columns = [
-        np.concatenate([f, np.cross((x, y, 0.0), f)])
-        for x, y in product((X, -X), (Y, -Y))
-        for f in edges
-    ]
-    G = np.array(columns).T
+    G = np.array([np.concatenate([f, np.cross(at, f)]) for at in corners for f in edges]).T
+    size = metric**-0.5 * (np.arange(metric.size) != 2)
     inside = 0
     for _ in range(1500):
-        w = rng.normal(size=6) * (MU, MU, 0.0, Y, X, MU * (X + Y)) * rng.uniform(0.2, 0.9)
-        w[2] = 1.0
+        part = rng.normal(size=metric.size) * size * rng.uniform(0.2, 0.9)
+        part[2] = 1.0
+        w = np.zeros(6)
+        w[list(held)] = part
         gap = nnls(G, w)[1]
-        margin = np.max(C @ w)
+        margin = np.max(cone @ part)
         if abs(margin) < 1e-9:
             continue
         inside += margin < 0.0
         assert (margin < 0.0) == (gap < 1e-9)
+    return inside
+
+
+def test_the_cone_of_an_edge_is_what_both_ends_carry():
+    X = HALF[0]
+    ends = [(X, 0.0, 0.0), (-X, 0.0, 0.0)]
+    inside = carried_alike(edge_cone(X, MU), ends, (0, 1, 2, 4, 5), edge_metric(X, MU))
     assert 300 < inside < 1200
+
+
+def test_the_cone_of_an_edge_is_that_of_a_sole_without_width():
+    rng = np.random.default_rng(1)
+    C, flat = edge_cone(0.1, MU), sole_cone((0.1, 0.0), MU)
+    for part in rng.normal(size=(300, 5)) * (0.3, 0.3, 0.3, 0.05, 0.03) + (0, 0, 1.0, 0, 0):
+        w = np.zeros(6)
+        w[[0, 1, 2, 4, 5]] = part
+        # A row of the one that is another scaled, or the sum of two, says nothing new.
+        assert (np.max(C @ part) <= 0.0) == (np.max(flat @ w) <= 1e-12)
 
 
 def test_a_point_carries_what_its_pyramid_allows():

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from opspace.command import Command, ContactStatus, Found, Status
-from opspace.contacts import PointContact, SoleContact
+from opspace.contacts import EdgeContact, PointContact, SoleContact
 from opspace.errors import ScenarioError
 from opspace.record import load
 from opspace.record.contact_columns import felt_in
@@ -45,6 +45,25 @@ def test_contacts_ground_and_events_are_built_from_their_entries():
     assert sum(c.force[2] for c in command.contacts.values()) == pytest.approx(WEIGHT, rel=0.02)
 
 
+def test_a_foot_may_stand_on_an_edge():
+    toes = {"type": "edge", "frame": "right_ankle_roll_link", "half": 0.025}
+    left = parse(STANDING).data["contacts"]["left"]
+    contacts = {"left": left, "right": {**toes, "offset": [0.12, 0.0, -0.035]}}
+    built = build(standing(contacts=contacts, events=[]))
+    edge = built.contacts["right"]
+    assert isinstance(edge, EdgeContact)
+    assert np.allclose(edge.along, [0.0, 1.0, 0.0])
+    balls = [built.plant.model.geom(f"opspace_touch/right/{i}").pos[1] for i in range(2)]
+    assert sorted(balls) == pytest.approx([-0.025, 0.025])
+    command = built.controller.step(0.0, built.plant.q, built.plant.v)
+    # Its own x is along the line, the world's y: it turns the foot about everything else.
+    assert command.contacts["right"].force[2] > 10.0
+    assert abs(command.contacts["right"].moment[1]) < 1e-9
+    wrong = {**contacts, "right": {**toes, "along": [0.0, 0.0, 0.0]}}
+    with pytest.raises(ScenarioError, match="zero"):
+        standing(contacts=wrong, events=[])
+
+
 def test_a_named_configuration_is_set_down_and_a_written_one_is_left():
     named = build(standing())
     foot = named.robot.frame_id("left_ankle_roll_link")
@@ -66,7 +85,7 @@ def test_a_buffer_is_what_somebody_asked_for():
         ("contacts.left.frame=nose", "contacts.left.frame", "unknown frame 'nose'"),
         ("contacts.left.half=[0.1, 0]", "contacts.left.half[1]", "above 0"),
         ("contacts.palm.normal=[0, 0, 0]", "contacts.palm.normal", "zero"),
-        ("contacts.left.type=edge", "contacts.left.type", "sole, point"),
+        ("contacts.left.type=ball", "contacts.left.type", "sole, edge, point"),
         ("contacts.com={type: point, frame: pelvis}", "contacts.com", "name of a task"),
         ("ground.boards[0].contact=foot", "ground", "unknown contact 'foot'"),
         ("events[0].when.contact=foot", "events[0]", "unknown contact 'foot'"),

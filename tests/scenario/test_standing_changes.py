@@ -216,3 +216,95 @@ def test_who_cannot_be_saved_is_given_up_before_it_lies(impulse):
     seen = pushed("talos", impulse, 0)
     fell = next(i for i, status in enumerate(seen.status) if Status.FALLING in status)
     assert seen.q[fell][2] > 0.9 * seen.q[0][2]
+
+
+SOLE = {"type": "sole", "frame": "{}_ankle_roll_link", **ONE_SIDE["g1"]}
+TOES = {
+    "robot": "g1",
+    "duration": 4.6,
+    "torque_limits": "priority",
+    "contacts": {
+        "left": {**SOLE, "frame": "left_ankle_roll_link"},
+        "right": {**SOLE, "frame": "right_ankle_roll_link"},
+        "toes": {
+            "type": "edge",
+            "frame": "right_ankle_roll_link",
+            "half": 0.025,
+            "offset": [0.12, 0.0, -0.03],
+        },
+    },
+    "tasks": {
+        "com": {
+            "type": "com",
+            "level": 0,
+            "target": {
+                "type": "minimum_jerk",
+                "offset": [0.03, 0.04, 0.0],
+                "start_time": 0.2,
+                "duration": 1.0,
+            },
+        },
+        "torso": {"type": "orientation", "level": 1, "frame": "torso_link"},
+        "roll": {
+            "type": "orientation",
+            "level": 2,
+            "frame": "right_ankle_roll_link",
+            "present": False,
+            "target": {
+                "type": "stops",
+                "moves": [
+                    {"at": 2.1, "duration": 0.8, "offset": [0.0, 0.35, 0.0]},
+                    {"at": 3.0, "duration": 0.8, "offset": [0.0, 0.0, 0.0]},
+                ],
+            },
+        },
+        "posture": {"type": "posture", "level": 9, "kp": 25.0},
+    },
+    "events": [
+        {"at": 1.4, "insert": "roll", "level": 2, "duration": 0.0},
+        {"at": 1.4, "insert": "toes", "duration": 0.3},
+        {"at": 1.7, "remove": "right", "duration": 0.3},
+        {"at": 3.9, "insert": "right", "duration": 0.3},
+        {"at": 4.2, "remove": "toes", "duration": 0.3},
+    ],
+}
+"""A foot rolls on its toes by 0.35 rad and back; its front is a part of the sole and the edge."""
+
+
+class OnToes(Seen):
+    """Watches the edge while it is what the right foot has."""
+
+    def __init__(self, scenario):
+        self.use, self.apart, self.turned, self.where = [], [], [], []
+        super().__init__(scenario)
+
+    def observe(self, q, v, command):
+        super().observe(q, v, command)
+        if "toes" not in command.contacts or "right" in command.contacts:
+            return
+        toes, robot, felt = (
+            command.contacts["toes"],
+            self.controller.robot,
+            self.plant.contact_forces,
+        )
+        R, p = (of("right_ankle_roll_link") for of in (robot.rotation, robot.position))
+        self.use.append(toes.cone_use)
+        self.apart.append(toes.force - felt["toes"] - felt["right"])
+        self.turned.append(np.arcsin(-R[2, 0]))
+        self.where.append(p + R @ (0.12, 0.0, -0.03))
+
+
+@pytest.mark.slow
+def test_a_foot_rolls_on_its_toes_and_back_without_a_step():
+    seen = OnToes(scenario_from(TOES))
+    apart = np.sqrt(np.mean(np.square(seen.apart)))
+    print("toes", seen.step(1.4), max(seen.com), max(seen.turned), max(seen.use), apart)
+    assert seen.outcome.completed
+    assert list(seen.controller.stack.contacts) == ["left", "right"]
+    assert seen.step(1.4) <= 0.15
+    assert max(seen.com) <= 2e-3
+    assert max(seen.turned) == pytest.approx(0.35, abs=0.01)
+    assert 0.0 < max(seen.use) <= 1.0 + 1e-6
+    # The ball that stands for the toes rolls by its radius; it does not slide.
+    assert np.max(np.ptp(seen.where, axis=0)) <= 0.35 * 0.005 + 5e-4
+    assert apart <= 1.0

@@ -177,7 +177,7 @@ def test_names_levels_and_what_is_no_contact_are_refused():
         stack.insert(osc.PositionTask(name="hand"))
     with pytest.raises(InputError, match="only contacts wait"):
         stack.remove("posture", wait=True)
-    with pytest.raises(InputError, match="SoleContact or PointContact"):
+    with pytest.raises(InputError, match="SoleContact, EdgeContact or PointContact"):
         osc.Stack([], contacts=[osc.PostureTask()])
     with pytest.raises(UnknownNameError, match="hand"):
         stack.remove(sole("hand"))

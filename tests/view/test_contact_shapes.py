@@ -84,6 +84,10 @@ def test_the_edges_of_a_cone_have_the_slope_of_friction():
     [
         {"frame": "FL_foot", "offset": [0, 0, 0.1], "half": [0.1, 0.05], "normal": None},
         {"frame": "FL_foot", "offset": [0, 0, 0.1], "half": None, "normal": [-1.0, 0, 0]},
+        {
+            **{"frame": "FL_foot", "offset": [0, 0, 0.1], "half": [0.1, 0.0]},
+            **{"normal": [0.0, 0.0, 1.0], "along": [0.0, 1.0, 0.0]},
+        },
     ],
 )
 def test_a_contact_is_drawn_where_it_is(about):
@@ -94,7 +98,7 @@ def test_a_contact_is_drawn_where_it_is(about):
     assert np.allclose(place.point, point)
     assert np.allclose(place.axes.T @ place.axes, np.eye(3))
     assert np.allclose(place.corners.mean(axis=0), point)
-    if about["half"] is None:
+    if about["normal"] is not None:
         assert np.allclose(place.axes[:, 2], about["normal"])
     pressed = pressure_point(place, contact(cop=(0.01, 0.02)))
     assert np.allclose(place.axes.T @ (pressed - point), [0.01, 0.02, 0.0])

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from opspace.compare.laws import REGULARISATION, presences, weighted_least_squares
+from opspace.compare.strict_program import StrictProgramController, daqp_installed
 from opspace.controller import Controller, ReferenceController
 from opspace.controller.stages import Question
 from opspace.law import LawInfo
@@ -80,11 +81,15 @@ class Variant:
         title: What it does.
         changes: What it changes in the scenario.
         controller: Makes the controller.
+        needs: Package that it needs beside the library's own; empty for none.
+        installed: Whether that is there.
     """
 
     title: str
     changes: Mapping[str, Any]
     controller: Callable[..., ReferenceController] = Controller
+    needs: str = ""
+    installed: Callable[[], bool] = lambda: True
 
 
 VARIANTS: Mapping[str, Variant] = MappingProxyType(
@@ -101,13 +106,32 @@ VARIANTS: Mapping[str, Variant] = MappingProxyType(
             {"method": "switch"},
             partial(ReferenceController, law=ten_to_one),
         ),
+        "hierarchy": Variant(
+            "strict priorities by one quadratic program per level; the forces of contacts are ramped",
+            {},
+            StrictProgramController,
+            "daqp",
+            daqp_installed,
+        ),
+        "hierarchy-switch": Variant(
+            "the same programs, hard switch",
+            {"method": "switch"},
+            StrictProgramController,
+            "daqp",
+            daqp_installed,
+        ),
     }
 )
 
 
+def usable_variants() -> dict[str, Variant]:
+    """Give the variants whose packages are installed."""
+    return {name: variant for name, variant in VARIANTS.items() if variant.installed()}
+
+
 def reproduce_humanoid(
     out: Path,
-    variants: Mapping[str, Variant] = VARIANTS,
+    variants: Mapping[str, Variant] | None = None,
     *,
     scenario: Scenario | None = None,
     progress: ProgressBar | None = None,
@@ -116,7 +140,7 @@ def reproduce_humanoid(
 
     Args:
         out: Directory to write to; each variant gets one below it.
-        variants: The variants.
+        variants: The variants; None is all whose packages are installed.
         scenario: Another scenario with the same events; None is the shipped one.
         progress: Bar that gets a line for each run.
 
@@ -133,7 +157,7 @@ def reproduce_humanoid(
             overwrite=True,
             controller=variant.controller,
         )
-        for name, variant in variants.items()
+        for name, variant in (usable_variants() if variants is None else variants).items()
     }
     write_json(out / METRICS, {name: measures(run.recording, base) for name, run in runs.items()})
     return runs

@@ -12,6 +12,7 @@ from opspace.compare import controllers as others
 from opspace.compare.blendings import CrossFade, Present
 from opspace.compare.laws import continuous_inverse, damped_inverse
 from opspace.compare.projections import BarrierProgram
+from opspace.compare.strict_program import StrictProgramController, daqp_installed
 from opspace.compare.tsid_controller import TsidController, tsid_installed
 from opspace.controller import Controller, ReferenceController
 from opspace.scenario import Scenario
@@ -30,6 +31,7 @@ class Method:
         profile: Profile of every event; None leaves them as they are.
         installed: Whether the package that it needs is there.
         stands: Whether it can drive a robot that stands on contacts.
+        bolted: Whether it can drive one that is bolted down.
     """
 
     title: str
@@ -39,6 +41,7 @@ class Method:
     profile: str | None = None
     installed: Callable[[], bool] = lambda: True
     stands: bool = True
+    bolted: bool = True
 
     def scenario(self, scenario: Scenario) -> Scenario:
         """Write down what this method runs in place of a scenario."""
@@ -105,6 +108,21 @@ METHODS: Mapping[str, Method] = MappingProxyType(
             BarrierProgram,
             stands=False,
         ),
+        "hierarchy": Method(
+            "strict priorities by one quadratic program per level; the forces of contacts are ramped",
+            "cones, motors and joints are hard in every program",
+            StrictProgramController,
+            installed=daqp_installed,
+            bolted=False,
+        ),
+        "hierarchy-switch": Method(
+            "the same programs, hard switch",
+            "cones, motors and joints are hard in every program",
+            StrictProgramController,
+            {"method": "switch"},
+            installed=daqp_installed,
+            bolted=False,
+        ),
         "tsid": Method(
             "TSID: one quadratic program, 100 to 1 from level to level, weights ramped",
             "no joint limits; no sigma buffer",
@@ -123,5 +141,5 @@ def usable_methods(scenario: Scenario) -> list[str]:
     return [
         name
         for name, method in METHODS.items()
-        if method.installed() and (method.stands or not floats)
+        if method.installed() and (method.stands if floats else method.bolted)
     ]

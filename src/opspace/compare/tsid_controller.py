@@ -52,7 +52,10 @@ class TsidController(ReferenceController):
         robot.update(q, v)
         if self._program is None:
             if robot.floating_base:
-                raise InputError("this form of TSID knows no contacts: its robots are bolted down")
+                raise InputError(
+                    f"the method tsid knows no contacts, and robot {robot.name!r} stands on them: "
+                    "its robots are bolted down"
+                )
             if self.collisions is not None:
                 raise InputError("this form of TSID keeps nothing apart: run it without collisions")
             self._program = Program(self)
@@ -81,7 +84,7 @@ class Program:
 
     def __init__(self, controller: ReferenceController) -> None:
         if not tsid_installed():
-            raise InputError("the method tsid needs TSID's Python package: conda install tsid")
+            raise InputError("the method tsid needs TSID's Python package: pip install tsid")
         import tsid
         from pinocchio import StdVec_StdString
 

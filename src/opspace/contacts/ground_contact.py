@@ -48,11 +48,12 @@ class GroundContact(KnownAttributes, ABC):
 
     The contact is a motion, J q̈ = −k_d J v − J̇ v, above every task, and a force λ inside its cone.
     In a stack both come and go with one progress: motion before force on the way in, force before
-    motion on the way out. See `opspace.SoleContact` and `opspace.PointContact`.
+    motion on the way out. See `opspace.SoleContact`, `opspace.EdgeContact` and `opspace.PointContact`.
 
     Attributes:
         name: Name of the contact, unique within a stack.
-        rows: m, the number of its rows.
+        held: Which m components of the motion (velocity, angular velocity) it holds, in its own axes;
+            those of its force are the same.
         frame: Name of the frame that touches.
         offset: (3,) its point in that frame, m.
         friction: μ.
@@ -61,7 +62,7 @@ class GroundContact(KnownAttributes, ABC):
     """
 
     activation: Callable[[Robot, float], float] | None = None
-    rows: int
+    held: tuple[int, ...]
 
     def __init__(
         self,
@@ -116,6 +117,11 @@ class GroundContact(KnownAttributes, ABC):
         self._force = wanted
 
     @property
+    def rows(self) -> int:
+        """Number of its rows, m."""
+        return len(self.held)
+
+    @property
     def frame_id(self) -> int:
         """Number of its frame on the robot, −1 before it is bound."""
         return self._id
@@ -161,8 +167,9 @@ class GroundContact(KnownAttributes, ABC):
         moving = np.concatenate([J[:3] - skew(arm) @ J[3:], J[3:]])
         turning = cross(omega, cross(omega, arm)) + cross(drift[3:], arm)
         carried = np.concatenate([drift[:3] + turning, drift[3:]])
-        own = np.concatenate([axes.T @ moving[:3], axes.T @ moving[3:]])[: self.rows]
-        beside = np.concatenate([axes.T @ carried[:3], axes.T @ carried[3:]])[: self.rows]
+        held = list(self.held)
+        own = np.concatenate([axes.T @ moving[:3], axes.T @ moving[3:]])[held]
+        beside = np.concatenate([axes.T @ carried[:3], axes.T @ carried[3:]])[held]
         stilled = -STILLING * (own @ robot.v) - beside
         return ContactTerms(own, stilled, axes, robot.position(self._id) + arm)
 
@@ -190,6 +197,12 @@ class GroundContact(KnownAttributes, ABC):
         if force is not None:
             reference[:3] = force
         return (1.0 if force is None else STIFF) * self.metric(), reference
+
+    def wrench(self, force: Array) -> Array:
+        """Write a force λ, (m,), as (6,) force and moment in the contact's axes, N and N·m."""
+        found = np.zeros(6)
+        found[list(self.held)] = force
+        return found
 
     @abstractmethod
     def cone(self) -> Array:

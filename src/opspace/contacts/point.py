@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-import numpy as np
 from numpy.typing import ArrayLike
 
-from opspace.contacts.ground_contact import GroundContact
-from opspace.errors import InputError
+from opspace.contacts.surface_contact import SurfaceContact
 from opspace.law.cones import point_cone, point_metric
-from opspace.law.contact_forces import NORMAL
-from opspace.tasks.validation import Array, finite_array
+from opspace.tasks.validation import Array
 
 
-class PointContact(GroundContact):
+class PointContact(SurfaceContact):
     """Holds a point on a surface and lets its frame turn: three rows, a friction pyramid.
 
     Args:
@@ -29,7 +26,7 @@ class PointContact(GroundContact):
         InputError: A number that cannot be used.
     """
 
-    rows = 3
+    held = (0, 1, 2)
 
     def __init__(
         self,
@@ -43,25 +40,14 @@ class PointContact(GroundContact):
         name: str | None = None,
     ) -> None:
         super().__init__(
-            frame, offset=offset, friction=friction, force=force, max_force=max_force, name=name
+            frame,
+            offset=offset,
+            normal=normal,
+            friction=friction,
+            force=force,
+            max_force=max_force,
+            name=name,
         )
-        z = finite_array(normal, (3,), f"contact {self.name!r}: normal")
-        if not np.linalg.norm(z) > 0.0:
-            raise InputError(f"contact {self.name!r}: the normal must not be zero")
-        z = z / np.linalg.norm(z)
-        x = np.cross(np.eye(3)[np.argmin(np.abs(z))], z)
-        x /= np.linalg.norm(x)
-        self._surface = np.stack([x, np.cross(z, x), z], axis=1)
-
-    @property
-    def surface(self) -> Array:
-        """Axes of the surface in the world, (3, 3), as columns, z out of it."""
-        return self._surface
-
-    @property
-    def normal(self) -> Array:
-        """Direction out of the surface, (3,) in the world, of length 1."""
-        return self._surface[:, NORMAL].copy()
 
     def cone(self) -> Array:
         """Return the rows of the friction pyramid, (4, 3)."""

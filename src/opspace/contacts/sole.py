@@ -25,7 +25,7 @@ class SoleContact(GroundContact):
         InputError: A number that cannot be used.
     """
 
-    rows = 6
+    held = (0, 1, 2, 3, 4, 5)
 
     def __init__(
         self,

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from opspace.command import ContactStatus, Status
-from opspace.contacts import ContactTerms, SoleContact
+from opspace.contacts import ContactTerms
 from opspace.controller.bounds import NOTHING, Bounds, Kept, acting
 from opspace.controller.collisions import DistanceTerms
 from opspace.controller.limit_task_sets import TOP, LimitTerms
@@ -20,7 +20,6 @@ from opspace.law.contact_forces import (
     Room,
     Wish,
     free_motions,
-    realise,
     share,
 )
 from opspace.law.scalars import (
@@ -124,7 +123,7 @@ def stand(
     apart = (np.zeros((0, k.v.size)), NOTHING, NOTHING)
     if distances is not None:
         apart = (distances.G, distances.most, distances.softness(k.M))
-    found = realise(wish, carrying, Room(bounds.lower, bounds.upper, room, *apart))
+    found = rules.realise(wish, carrying, Room(bounds.lower, bounds.upper, room, *apart))
     if rules.observer is not None:
         rules.observer.remember(k.t, k.v, found.acceleration)
     weight = float(np.linalg.norm(k.robot.gravity[:3]))
@@ -188,21 +187,20 @@ def _told(
 def contact_status(touch: Footing, one: ForceSet, force: np.ndarray) -> ContactStatus:
     """Tell about one contact."""
     pressed, axes = float(force[NORMAL]), touch.terms.axes
-    sole = isinstance(touch.member.contact, SoleContact)
-    moment = axes @ force[3:] if sole else np.zeros(3)
+    moment = touch.member.contact.wrench(force)[3:]
     cop, use = np.zeros(2), 0.0
     if pressed > BARELY * touch.member.contact.max_force:
         edge = -one.cone[:, NORMAL] * pressed
         use = float(np.max(1.0 + (one.cone @ force) / edge))
-        if sole:
-            cop = np.array([-force[4], force[3]]) / pressed
+        if np.any(moment):
+            cop = np.array([-moment[1], moment[0]]) / pressed
     member = touch.member
     return ContactStatus(
         member.progress,
         touch.motion,
         touch.force,
         axes @ force[:3],
-        moment,
+        axes @ moment,
         cop,
         use,
         member.waiting,

@@ -41,6 +41,8 @@ from opspace.law import (
     whiten,
 )
 from opspace.law.blending import combined
+from opspace.law.contact_forces import ForceSet, Realised, Room, Wish
+from opspace.law.contact_forces import realise as nearest_with_forces
 from opspace.law.scalars import LOOKS, SCALED, SEEN, room_for, unrest_of
 from opspace.plan.scales import Scales
 from opspace.robots.adapter import spread_of
@@ -82,6 +84,9 @@ class Question(NamedTuple):
 Law = Callable[[Question], tuple[np.ndarray, LawInfo]]
 """A torque (n,), N·m, beside the bias and beside what ``motors`` starts with, and what it took."""
 
+Realisation = Callable[[Wish, Sequence[ForceSet], Room], Realised]
+"""What a robot on contacts does of what the law wants, see `opspace.law.contact_forces.realise`."""
+
 
 def sum_of_hard_torques(asked: Question) -> tuple[np.ndarray, LawInfo]:
     """Γ = Σ_T w_T H(T; f̃), the library's own law (Eq. 19-23)."""
@@ -106,6 +111,7 @@ class Rules:
         observer: Of what the model does not explain; None trusts the model.
         period: Time between two ticks, in which accelerations change, s; 0 where it is not known.
         guard: What is kept apart, None for nothing.
+        realise: What a robot on contacts does of what the law wants.
     """
 
     law: Law
@@ -118,6 +124,7 @@ class Rules:
     observer: DisturbanceObserver | None
     period: float
     guard: CollisionAvoidance | None = None
+    realise: Realisation = nearest_with_forces
 
 
 @dataclass(frozen=True)

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import math
+
 from opspace.kernels.columns import LOCAL
 from opspace.kernels.corners import insert
 from opspace.kernels.inertia import whiten_rows
 from opspace.kernels.level import project, solve_level, take_alternative
 from opspace.kernels.motion import A, R, V, move_joints, place_point
 from opspace.kernels.stance_columns import (
+    EDGE_ROWS,
+    NORMAL,
     PLACE_BODY,
     PLACE_FIRST,
     PLACE_JOINT,
@@ -15,7 +19,7 @@ from opspace.kernels.stance_columns import (
     SOLE_ROWS,
     SURFACE,
 )
-from opspace.law.scalars import STILLING
+from opspace.law.scalars import STILLING, TINY
 from opspace.machine.jit import jit
 
 
@@ -33,17 +37,46 @@ def evaluate_contacts(work):
         first = stance.place[c, PLACE_FIRST]
         end = first + stance.place[c, PLACE_ROWS]
         for i in range(end - first):
-            _row(work, c, first + i, 3 * (i // 3), i % 3)
+            part = component_of(end - first, i)
+            _row(work, c, first + i, 3 * (part // 3), part % 3)
         whiten_rows(work.inertia, joint, first, end, stance.Jw)
+
+
+@jit
+def component_of(rows, i):
+    """Which component of (force, moment) row i of a contact with so many rows is."""
+    return i + 1 if rows == EDGE_ROWS and i > NORMAL else i
 
 
 @jit
 def _axes(work, c):
     """Axes of a contact in the world, by rows: those of its frame, or of the surface."""
-    sole = work.stance.place[c, PLACE_ROWS] == SOLE_ROWS
+    rows = work.stance.place[c, PLACE_ROWS]
     for i in range(9):
         number = work.stance.numbers[c, SURFACE + i]
-        work.contact_axes[c, i] = work.motion[0, R + i] if sole else number
+        work.contact_axes[c, i] = work.motion[0, R + i] if rows == SOLE_ROWS else number
+    if rows == EDGE_ROWS:
+        _lay_down(work.contact_axes[c], work.motion[0])
+
+
+@jit
+def _lay_down(axes, x):
+    """Axes of an edge: x along it on the surface, from its direction in the frame and the normal."""
+    ax, ay, az = axes[0], axes[3], axes[6]
+    for k in range(3):
+        axes[3 * k] = x[R + 3 * k] * ax + x[R + 3 * k + 1] * ay + x[R + 3 * k + 2] * az
+    upwards, size = 0.0, 0.0
+    for k in range(3):
+        upwards += axes[3 * k] * axes[3 * k + 2]
+    for k in range(3):
+        axes[3 * k] -= upwards * axes[3 * k + 2]
+        size += axes[3 * k] * axes[3 * k]
+    size = max(math.sqrt(size), TINY)
+    for k in range(3):
+        axes[3 * k] /= size
+    for k in range(3):
+        i, j = 3 * ((k + 1) % 3), 3 * ((k + 2) % 3)
+        axes[3 * k + 1] = axes[i + 2] * axes[j] - axes[j + 2] * axes[i]
 
 
 @jit

@@ -8,7 +8,7 @@ from opspace.command import Status
 from opspace.kernels.algebra import cholesky, solve_lower, solve_lower_transposed
 from opspace.kernels.columns import LIMIT_BOUND
 from opspace.kernels.contact_projection import nearest_with_forces
-from opspace.kernels.contact_rows import take_rows
+from opspace.kernels.contact_rows import component_of, take_rows
 from opspace.kernels.distances import approach, will_close
 from opspace.kernels.inertia import acceleration_of, torque_of
 from opspace.kernels.limit_columns import MARGIN, SIGN
@@ -252,7 +252,9 @@ def _tell(work, c):
     first, rows = stance.place[c, PLACE_FIRST], stance.place[c, PLACE_ROWS]
     there = stance.force[c] > 0.0
     for i in range(force.shape[0]):
-        force[i] = stance.carried[first + i] if there and i < rows else 0.0
+        force[i] = 0.0
+    for i in range(rows):
+        force[component_of(rows, i)] = stance.carried[first + i] if there else 0.0
     work.contact_use[c] = 0.0
     if not (there and force[NORMAL] > BARELY * stance.most[c]):
         return

@@ -8,7 +8,13 @@ from typing import NamedTuple
 import numpy as np
 
 from opspace.command import ContactStatus
-from opspace.contacts import GroundContact, PointContact, SoleContact
+from opspace.contacts import (
+    EdgeContact,
+    GroundContact,
+    PointContact,
+    SoleContact,
+    SurfaceContact,
+)
 from opspace.kernels.columns import LOCAL, OFFSET
 from opspace.kernels.stance_columns import NORMAL, SURFACE
 from opspace.plan.contact_records import make_stance
@@ -17,7 +23,7 @@ from opspace.robots.protocol import Robot
 from opspace.stack import ContactMember
 from opspace.tasks.activations import checked_activation
 
-PACKED = (SoleContact, PointContact)
+PACKED = (SoleContact, EdgeContact, PointContact)
 """Contacts that compiled code evaluates, by exact type."""
 
 
@@ -38,14 +44,14 @@ class ContactTick(NamedTuple):
             axes: (9,) its axes in the world, by rows.
             use: Part of its cone that this uses.
         """
-        R, sole = axes.reshape(3, 3), isinstance(self.contact, SoleContact)
-        pressed = use != 0.0 and sole
+        R = axes.reshape(3, 3)
+        pressed = use != 0.0 and bool(np.any(force[3:]))
         return ContactStatus(
             self.progress,
             self.motion,
             self.force,
             R @ force[:3],
-            R @ force[3:] if sole else np.zeros(3),
+            R @ force[3:],
             np.array([-force[4], force[3]]) / force[NORMAL] if pressed else np.zeros(2),
             use,
             self.waiting,
@@ -126,8 +132,11 @@ class PackedContacts:
             stance.place[i] = place.body, place.joint, rows, first
             stance.numbers[i, LOCAL : LOCAL + 12] = place.local
             stance.numbers[i, OFFSET : OFFSET + 3] = contact.offset
-            if isinstance(contact, PointContact):
-                stance.numbers[i, SURFACE : SURFACE + 9] = contact.surface.ravel()
+            if isinstance(contact, SurfaceContact):
+                surface = contact.surface.copy()
+                if isinstance(contact, EdgeContact):
+                    surface[:, :NORMAL] = np.stack([contact.along, np.zeros(3)], axis=1)
+                stance.numbers[i, SURFACE : SURFACE + 9] = surface.ravel()
             stance.most[i], stance.edges[i] = contact.max_force, len(cone)
             stance.cone[i] = 0.0
             stance.cone[i, : len(cone), :rows] = cone
@@ -139,7 +148,7 @@ class PackedContacts:
 
 def _known(contact: GroundContact) -> tuple[object, ...]:
     """Collect what is packed of a contact."""
-    half = tuple(contact.half) if isinstance(contact, SoleContact) else None
+    half = contact.half if isinstance(contact, SoleContact | EdgeContact) else None
     force = contact.force
     return (
         id(contact),

@@ -19,12 +19,16 @@ COLORS: Mapping[str, str] = {
     "switch": style.VARIANT_COLORS["switch"],
     "weighted": style.VARIANT_COLORS["without"],
     "weighted-switch": style.line_color(3),
+    "hierarchy": style.line_color(4),
+    "hierarchy-switch": style.line_color(5),
 }
 TITLES: Mapping[str, str] = {
     "transition": "continuous",
     "switch": "hard switch",
     "weighted": "weighted QP",
     "weighted-switch": "switched weights",
+    "hierarchy": "strict QPs",
+    "hierarchy-switch": "switched QPs",
 }
 LOWEST = 1e-4
 """Where a torque step counts as none, N·m."""

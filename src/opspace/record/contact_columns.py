@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from opspace.command import ContactStatus
-from opspace.contacts import GroundContact, PointContact, SoleContact
+from opspace.contacts import EdgeContact, GroundContact, SoleContact, SurfaceContact
 from opspace.record.format import Column
 from opspace.record.reader import Recording
 
@@ -95,6 +95,14 @@ def subject_of_contact(contact: GroundContact) -> dict[str, Any]:
         "frame": contact.frame,
         "offset": contact.offset.tolist(),
         "friction": contact.friction,
-        "half": list(contact.half) if isinstance(contact, SoleContact) else None,
-        "normal": contact.normal.tolist() if isinstance(contact, PointContact) else None,
+        "half": _half(contact),
+        "along": contact.along.tolist() if isinstance(contact, EdgeContact) else None,
+        "normal": contact.normal.tolist() if isinstance(contact, SurfaceContact) else None,
     }
+
+
+def _half(contact: GroundContact) -> list[float] | None:
+    """Half of the sides along the contact's own x and y."""
+    if isinstance(contact, SoleContact):
+        return list(contact.half)
+    return [contact.half, 0.0] if isinstance(contact, EdgeContact) else None

@@ -41,7 +41,8 @@ def subject_of(
         before a limit in rad or m, and by limit the acceleration that its joint brakes with; null
         where there is none), ``tasks`` (units, stiffness, level, what its target can be led to, and
         where and with what a force task presses), ``contacts`` (frame, offset in m, friction, half
-        the sides of a sole in m, normal of a point), which only robots with a floating base have,
+        the sides in m, direction of an edge, normal of an edge or a point), which only robots with
+        a floating base have,
         and ``collisions``, see `opspace.record.obstacle_columns.about_collisions`, where something
         is kept apart.
     """

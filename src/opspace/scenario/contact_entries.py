@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Discriminator, Field, Tag, field_validator
 
-from opspace.contacts import GroundContact, PointContact, SoleContact
+from opspace.contacts import EdgeContact, GroundContact, PointContact, SoleContact
 from opspace.robots.protocol import Robot
 from opspace.scenario.fields import Entry, Number, problem
 from opspace.scenario.targets import Point, tag_of
@@ -62,10 +62,9 @@ class SoleEntry(ContactEntry):
         return SoleContact(**self.options(), name=name)
 
 
-class PointEntry(ContactEntry):
-    """A point on a surface whose frame may turn."""
+class TurningEntry(ContactEntry):
+    """What touches a surface on which its frame may turn."""
 
-    type: Literal["point"] = Field(description="point")
     normal: Direction = Field(
         default=(0.0, 0.0, 1.0), description="direction out of the surface, in the world"
     )
@@ -75,13 +74,40 @@ class PointEntry(ContactEntry):
     def _check_normal(cls, normal: tuple[float, ...]) -> tuple[float, ...]:
         return _check_direction(normal)
 
+
+class PointEntry(TurningEntry):
+    """A point on a surface whose frame may turn."""
+
+    type: Literal["point"] = Field(description="point")
+
     def build(self, name: str) -> GroundContact:
         """Make the contact."""
         return PointContact(**self.options(), name=name)
 
 
+class EdgeEntry(TurningEntry):
+    """A line on a surface about which its frame may turn."""
+
+    type: Literal["edge"] = Field(description="edge")
+    half: Annotated[float, Number("m", above=0.0)] = Field(description="half its length [m]")
+    along: Direction = Field(
+        default=(0.0, 1.0, 0.0), description="its direction, in the frame's axes"
+    )
+
+    @field_validator("along")
+    @classmethod
+    def _check_along(cls, along: tuple[float, ...]) -> tuple[float, ...]:
+        return _check_direction(along)
+
+    def build(self, name: str) -> GroundContact:
+        """Make the contact."""
+        return EdgeContact(**self.options(), name=name)
+
+
 AnyContact = Annotated[
-    Annotated[SoleEntry, Tag("<sole>")] | Annotated[PointEntry, Tag("<point>")],
+    Annotated[SoleEntry, Tag("<sole>")]
+    | Annotated[EdgeEntry, Tag("<edge>")]
+    | Annotated[PointEntry, Tag("<point>")],
     Discriminator(tag_of),
 ]
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from opspace.command import Command
-from opspace.contacts import GroundContact, PointContact
+from opspace.contacts import GroundContact, SurfaceContact
 from opspace.scenario.events import Event
 
 Ask = Callable[["float | None"], None]
@@ -107,5 +107,5 @@ def normal_force(contact: GroundContact, force: np.ndarray) -> float:
         contact: The contact.
         force: (3,) N in world axes.
     """
-    normal = contact.normal if isinstance(contact, PointContact) else UP
+    normal = contact.normal if isinstance(contact, SurfaceContact) else UP
     return float(normal @ force)

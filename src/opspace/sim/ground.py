@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from opspace.contacts import GroundContact, SoleContact
+from opspace.contacts import EdgeContact, GroundContact, SoleContact
 from opspace.errors import InputError, unknown_name
 from opspace.sim.held_load import place_of
 
@@ -60,8 +60,8 @@ class Board:
 class Ground:
     """A floor, perhaps walls, and what of the robot touches them.
 
-    A sole touches with small balls at its four corners, a point with one; nothing else touches
-    anything, whatever shapes the robot's file has.
+    A sole touches with small balls at its four corners, an edge with two at its ends, a point with one;
+    nothing else touches anything, whatever shapes the robot's file has.
 
     Attributes:
         contacts: What touches, whether a stack has it or not.
@@ -188,6 +188,9 @@ def corners(contact: GroundContact) -> Iterator[np.ndarray]:
         x, y = contact.half
         for a, b in product((1.0, -1.0), repeat=2):
             yield contact.offset + np.array([a * x, b * y, RADIUS])
+    elif isinstance(contact, EdgeContact):
+        for end in (contact.half, -contact.half):
+            yield contact.offset + end * contact.along
     else:
         yield np.array(contact.offset)
 

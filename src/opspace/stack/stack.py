@@ -259,7 +259,8 @@ class Stack:
         """
         if not isinstance(contact, GroundContact):
             raise InputError(
-                f"contacts are SoleContact or PointContact, not {type(contact).__name__}"
+                "contacts are SoleContact, EdgeContact or PointContact, "
+                f"not {type(contact).__name__}"
             )
         known = self.contacts.get(contact.name, contact)
         if known is not contact or contact.name in [task.name for task in self]:

@@ -54,15 +54,23 @@ def place_of(about: Mapping[str, Any], robot: Robot) -> ContactPlace:
     if about["half"] is None:
         return ContactPlace(point, _axes_about(np.array(about["normal"])), point[None])
     x, y = about["half"]
+    if about.get("along") is not None:
+        line = x * rotation @ np.array(about["along"])
+        axes = _axes_about(np.array(about["normal"]), line)
+        return ContactPlace(point, axes, np.array([point + line, point - line]))
     corners = [
         point + rotation @ (a * x, b * y, 0.0) for a, b in ((1, 1), (-1, 1), (-1, -1), (1, -1))
     ]
     return ContactPlace(point, rotation, np.array(corners))
 
 
-def _axes_about(normal: np.ndarray) -> np.ndarray:
-    x = np.cross(np.eye(3)[int(np.argmin(np.abs(normal)))], normal)
-    x /= np.linalg.norm(x)
+def _axes_about(normal: np.ndarray, along: np.ndarray | None = None) -> np.ndarray:
+    """Axes with z along a normal, and x as far as can be along a line."""
+    if along is None:
+        x = np.cross(np.eye(3)[int(np.argmin(np.abs(normal)))], normal)
+    else:
+        x = along - normal * (normal @ along)
+    x = x / np.linalg.norm(x)
     return np.stack([x, np.cross(normal, x), normal], axis=1)
 
 
