@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import hashlib
 import re
 from collections.abc import Iterator, Sequence
 from importlib import metadata
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -43,9 +45,10 @@ PRESS = ("GIVEN", "GIVEN_AT", "WANTED", "FORCES", "ON", "KI", "KP", "PRESS_SIZE"
 INNER = (
     "space.first_kept",
     *(f"stance.{name}" for name in ("count", "rows", "place", "edges", "numbers", "motion")),
+    *(f"integrals.{name}" for name in ("ki", "integral", "joint_integral", "since")),
     *(f"stance.{name}" for name in ("force", "most", "cone", "metric", "reference", "hindrance")),
 )
-"""Arrays of records in the record of a tick that the C source writes."""
+"""Arrays of records in the record of a tick, or beside it, that the C source writes."""
 CMAKE = """\
 cmake_minimum_required(VERSION 3.13)
 project(opspace_{name} LANGUAGES C)
@@ -182,7 +185,13 @@ def _layout() -> str:
     }
     lines += [f"#define {word} {x}\n" for word, x in whole.items()]
     lines += [f"#define {word} {float(x)!r}\n" for word, x in numbers.items()]
+    lines.append(f'#define OPSPACE_MODEL_FORM "{_form()}"\n')
     return f"{_written()}{''.join(lines)}"
+
+
+def _form() -> str:
+    """Return what changes with the structure of a model in C."""
+    return hashlib.sha256((SOURCES / "opspace.h").read_bytes()).hexdigest()[:16]
 
 
 def _header(name: str, found: Exported) -> str:
@@ -236,14 +245,15 @@ def _source(name: str, found: Exported, profile: int) -> str:
         f"static {declared}[] = {{\n{_wrapped(items)}}};\n" for declared, items in arrays.items()
     )
     members = [
-        _text(KERNELS.stamp),
+        _text(f"{KERNELS.stamp}-{_form()}"),
         *map(str, (found.plan.n, found.robot.nq, len(tasks))),
         *("joint", "task", str(found.moves), str(profile), str(len(found.levels)), "level"),
         *(str(found.base), str(len(found.robot.description.quaternions)), "quaternion"),
         *(str(len(found.contacts)), "contact", "fall" if found.fall else "0"),
         *(str(len(fields)), "field"),
         *(repr(found.period), str(int(found.robot_adds))),
-        *map(str, (words.size, found.image.handle, len(runs))),
+        *map(str, (words.size, found.image.handle)),
+        *(str(found.image.beside.get("integrals", -1)), str(len(runs))),
         *("run", "content", str(found.image.addresses.size), "address"),
     ]
     return (
@@ -298,7 +308,11 @@ def _target(packed: Packed, kind: np.ndarray) -> tuple[int, int, int]:
 
 
 def _size(found: Exported, name: str) -> int:
-    record = found.plan.tick
+    record: Any = found.plan.tick
+    first, _, rest = name.partition(".")
+    if first in found.image.beside:
+        assert found.plan.integrals is not None
+        record, name = found.plan.integrals.record, rest
     for part in name.split("."):
         record = getattr(record, part)
     return record.size

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 
 from opspace.command import Status
-from opspace.fleet.integral_sums import forget_sum, learn, push
 from opspace.kernels.columns import (
     FIRST_ROW,
     GOAL_ACCELERATION,
@@ -24,6 +23,7 @@ from opspace.kernels.columns import (
     TURN,
 )
 from opspace.kernels.dynamics import evaluate
+from opspace.kernels.integrals import forget_sum, learn, push
 from opspace.kernels.many_states import brake
 from opspace.kernels.motion import P, R, measure, move_joints
 from opspace.kernels.task_rows import _quaternion

@@ -63,7 +63,7 @@ typedef struct {
 
 /* An exported controller as data; its source defines one under its own name. */
 typedef struct {
-    const char *stamp; /* of the kernels that it was made for */
+    const char *stamp; /* of the kernels that it was made for, and of this structure */
     int n;             /* joints */
     int nq;            /* coordinates of a configuration */
     int tasks;
@@ -85,6 +85,7 @@ typedef struct {
     int robot_adds;    /* whether the robot adds the torque against gravity */
     int64_t words; /* of its memory */
     int64_t handle;
+    int64_t integrals; /* what integral action remembers; -1 where no task has any */
     int64_t runs; /* pieces of it that are not zero, */
     const opspace_run *run;
     const uint64_t *content; /* what they hold, one after the other, */
@@ -128,7 +129,8 @@ int opspace_set_target(
 
 /* Change the gains of a task: kp in 1/s^2 and kv in 1/s, one for each of its rows.
  *
- * A force task has no kp, and its kv is at least twice its integral gain. Returns 0, OPSPACE_NO_TASK or
+ * A force task has no kp, and its kv is at least twice its integral gain; kp kv of a task with ki stays
+ * above it. Returns 0, OPSPACE_NO_TASK or
  * OPSPACE_REFUSED: a gain is negative or not finite, or is no force task's. */
 int opspace_set_gains(opspace *controller, int task, const double *kp, const double *kv);
 
