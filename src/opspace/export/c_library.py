@@ -17,9 +17,11 @@ from opspace.controller.exported import Exported, exported
 from opspace.controller.reference import ReferenceController
 from opspace.controller.watchdog import JUMP, MISSED
 from opspace.errors import InputError
+from opspace.export.own_kernels import frozen
 from opspace.kernels import columns, stance_columns
 from opspace.law import PROFILES, press_columns
 from opspace.law.scalars import MAY_GIVE_UP, NO_GROUP, TANH_EDGE
+from opspace.machine.freeze import MEMORY, Frozen
 from opspace.machine.processor import host
 from opspace.plan.entries import KERNELS
 from opspace.plan.pack_task import Packed
@@ -78,6 +80,7 @@ def export_c(
     levels: Sequence[float] = (),
     moves: int = 2,
     profile: str = "quintic",
+    own_kernels: bool = False,
     overwrite: bool = False,
 ) -> Path:
     """Write a controller as files that a C or C++ program is linked with.
@@ -94,6 +97,9 @@ def export_c(
         moves: How many moves and swaps can be on their way at once; each has its memory and its part
             of a tick.
         profile: Profile of all transitions, see `opspace.Profile`.
+        own_kernels: Compile kernels for this controller alone, which takes as long as compiling all
+            of them. They know its sizes and its robot, which makes them faster; the torque differs
+            from that of `Controller.step` in its last bits, and a program has one of it at a time.
         overwrite: Replace files that are already there.
 
     Returns:
@@ -109,12 +115,13 @@ def export_c(
     if not NAME.fullmatch(name) or name.startswith("opspace"):
         raise InputError(f"{name!r} is no name for a model in C: letters, digits and _")
     found = exported(controller, absent, profile, levels, moves)
+    own = frozen(found) if own_kernels else None
     files = {
         "opspace_codes.h": _codes().encode(),
         "opspace_layout.h": _layout().encode(),
         f"{name}.h": _header(name, found).encode(),
-        f"{name}.c": _source(name, found, PROFILES.index(profile)).encode(),
-        "opspace_kernels.o": KERNELS.object(),
+        f"{name}.c": _source(name, found, PROFILES.index(profile), own).encode(),
+        "opspace_kernels.o": KERNELS.object() if own is None else KERNELS.object_for(own),
         "CMakeLists.txt": CMAKE.format(name=name, sources=" ".join(_c_sources())).encode(),
         **{path.name: path.read_bytes() for path in sorted(SOURCES.iterdir())},
     }
@@ -216,7 +223,7 @@ def _header(name: str, found: Exported) -> str:
     )
 
 
-def _source(name: str, found: Exported, profile: int) -> str:
+def _source(name: str, found: Exported, profile: int, own: Frozen | None) -> str:
     """Write the numbers of the model."""
     words, runs = found.image.words, list(_runs(found.image.words))
     content = [format(x, "#x") for first, count in runs for x in words[first : first + count]]
@@ -244,8 +251,9 @@ def _source(name: str, found: Exported, profile: int) -> str:
     data = "".join(
         f"static {declared}[] = {{\n{_wrapped(items)}}};\n" for declared, items in arrays.items()
     )
+    memory = f"extern uint64_t {MEMORY}[];\n\n" if own else ""
     members = [
-        _text(f"{KERNELS.stamp}-{_form()}"),
+        _text(f"{KERNELS.stamp}-{f'{own.stamp}-' if own else ''}{_form()}"),
         *map(str, (found.plan.n, found.robot.nq, len(tasks))),
         *("joint", "task", str(found.moves), str(profile), str(len(found.levels)), "level"),
         *(str(found.base), str(len(found.robot.description.quaternions)), "quaternion"),
@@ -255,9 +263,10 @@ def _source(name: str, found: Exported, profile: int) -> str:
         *map(str, (words.size, found.image.handle)),
         *(str(found.image.beside.get("integrals", -1)), str(len(runs))),
         *("run", "content", str(found.image.addresses.size), "address"),
+        MEMORY if own else "0",
     ]
     return (
-        f'{_written()}#include "{name}.h"\n\n{data}\n'
+        f'{_written()}#include "{name}.h"\n\n{memory}{data}\n'
         f"const opspace_model {name} = {{\n{_wrapped(members)}}};\n"
     )
 

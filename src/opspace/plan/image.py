@@ -20,6 +20,7 @@ class Image(NamedTuple):
     Attributes:
         words: (N,) uint64, the contents; an address counts words from the first one.
         addresses: Which words are addresses.
+        handles: Word from which on there are handles.
         handle: Word where the handle of the record begins.
         beside: The same of the others, by name.
         first: Word where each array of the record begins, by name; those of a record in it, or beside
@@ -28,6 +29,7 @@ class Image(NamedTuple):
 
     words: np.ndarray
     addresses: np.ndarray
+    handles: int
     handle: int
     beside: dict[str, int]
     first: dict[str, int]
@@ -71,7 +73,7 @@ def image(handle: Handle, **beside: Handle) -> Image:
     begin, others = put(handle), {name: put(one) for name, one in beside.items()}
     named = [*_named(handle), *(x for name, one in beside.items() for x in _named(one, f"{name}."))]
     found = {name: place(field) for name, field in named if field.size}
-    return Image(np.concatenate(words), np.array(sorted(addresses)), begin, others, found)
+    return Image(np.concatenate(words), np.array(sorted(addresses)), ends[-1], begin, others, found)
 
 
 def _arrays(handle: Handle) -> Iterator[np.ndarray]:

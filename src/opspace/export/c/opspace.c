@@ -92,6 +92,27 @@ static int made_for_these_kernels(const char *stamp)
         && strcmp(stamp + kernels, "-" OPSPACE_MODEL_FORM) == 0;
 }
 
+/* Whether the memory of kernels of one's own is in use. */
+static int taken;
+
+static uint64_t *take_memory(const opspace_model *m)
+{
+    size_t size = (size_t)m->words * sizeof *m->memory;
+    if (!m->memory)
+        return calloc(1, size);
+    if (__atomic_exchange_n(&taken, 1, __ATOMIC_ACQUIRE))
+        return NULL;
+    return memset(m->memory, 0, size);
+}
+
+static void give_memory_back(const opspace_model *m, uint64_t *words)
+{
+    if (words && words == m->memory)
+        __atomic_store_n(&taken, 0, __ATOMIC_RELEASE);
+    else
+        free(words);
+}
+
 opspace *opspace_open(const opspace_model *model)
 {
     if (!model || !made_for_these_kernels(model->stamp))
@@ -100,7 +121,7 @@ opspace *opspace_open(const opspace_model *model)
     if (!c)
         return NULL;
     c->model = model;
-    c->words = calloc((size_t)model->words, sizeof *c->words);
+    c->words = take_memory(model);
     c->state = calloc((size_t)(model->nq + model->n), sizeof *c->state);
     if (!c->words || !c->state || !opspace_make_ring(c) || !opspace_make_places(c)
         || !opspace_make_contacts(c) || !opspace_make_fall(c) || !opspace_make_integrals(c)) {
@@ -119,7 +140,7 @@ opspace *opspace_open(const opspace_model *model)
 void opspace_close(opspace *c)
 {
     if (c) {
-        free(c->words);
+        give_memory_back(c->model, c->words);
         free(c->paper);
         free(c->state);
         free(c->place);

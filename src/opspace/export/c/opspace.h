@@ -91,13 +91,15 @@ typedef struct {
     const uint64_t *content; /* what they hold, one after the other, */
     int64_t addresses;
     const int64_t *address; /* and which words hold the place of another one */
+    uint64_t *memory;       /* where kernels of its own have it; NULL is anywhere */
 } opspace_model;
 
 typedef struct opspace opspace;
 
 /* Make a controller that has not ticked yet.
  *
- * NULL where there is no memory, or where the kernels are not those that the model was made for. */
+ * NULL where there is no memory, or where the kernels are not those that the model was made for; with
+ * kernels of its own also as long as there is another one. */
 opspace *opspace_open(const opspace_model *model);
 
 /* Give its memory back; NULL is none. */
