@@ -5,6 +5,8 @@ import ctypes
 import numpy as np
 import pytest
 
+from opspace.export.own_kernels import arrays_of
+from opspace.plan.records import TICK
 from tests.export.in_c import InC, with_cc
 from tests.export.test_c_library import start
 from tests.export.test_integrals_in_c import learning
@@ -15,6 +17,26 @@ BUILDS = {
     "arm that learns": lambda: learning("panda", "tool")[0],
     "quadruped": lambda: standing("solo12")[0],
 }
+
+
+@pytest.mark.parametrize("name", BUILDS)
+def test_what_is_constant_is_written_by_no_tick(name):
+    controller = BUILDS[name]()
+    robot = controller.robot
+    q, v = robot.q_reference, np.zeros(robot.nv)
+    controller.step(0.0, q, v)
+    tick = controller._plan.tick
+    before = {one: array.copy() for one, array, stays in arrays_of(TICK, tick) if stays}
+    assert {"option", "bodies.kind", "inertia.end", "torque_limit"} <= set(before)
+    assert not {"tau", "kind", "variable", "slots", "numbers", "dynamics.M"} & set(before)
+    for k in range(1, 100):
+        chance = np.random.default_rng(k)
+        spread = 0.3 if k % 7 == 0 and robot.nq == robot.nv else 0.01
+        q = robot.integrate(robot.q_reference, spread * chance.normal(size=robot.nv), 1.0)
+        controller.step(1e-3 * k, q, spread * chance.normal(size=robot.nv))
+    after = {one: array for one, array, _ in arrays_of(TICK, tick)}
+    for one, array in before.items():
+        np.testing.assert_array_equal(after[one], array, err_msg=one)
 
 
 @with_cc

@@ -21,7 +21,7 @@ WRITTEN = {"variable", "slots", "slot_on", "slot_off", "slot_place", "space.firs
 def frozen(found: Exported) -> Frozen:
     """Tell what never changes of an exported controller: all sizes, its robot, options and limits."""
     image = found.image
-    arrays = list(_arrays(TICK, found.plan.tick))
+    arrays = list(arrays_of(TICK, found.plan.tick))
     changing = np.zeros(image.words.size, bool)
     for name, array, stays in arrays:
         if name in image.first and not stays:
@@ -48,14 +48,14 @@ def frozen(found: Exported) -> Frozen:
     )
 
 
-def _arrays(
+def arrays_of(
     table: RecordTable, record: Record, before: str = ""
 ) -> Iterator[tuple[str, np.ndarray, bool]]:
     """List all arrays by name, and whether each stays what it is."""
     for field in table.fields:
         name, value = before + field.name, getattr(record, field.name)
         if field.of is not None:
-            yield from _arrays(field.of, value, f"{name}.")
+            yield from arrays_of(field.of, value, f"{name}.")
             continue
         fixed = field.writer == field.lives == "plan" or field.writer == field.lives == "robot"
         yield name, value, fixed and name not in WRITTEN and not name.startswith("stance.")
