@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from collections.abc import Set as AbstractSet
 
 import numpy as np
 
@@ -14,14 +15,16 @@ from opspace.plan.records import TICK
 KERNELS_IN_C = ("tick", "gravity", "learn")
 VECTORISE_FROM = 14
 """Joints from which on vectorised loops are faster than plain ones."""
-WRITTEN = {"variable", "slots", "slot_on", "slot_off", "slot_place", "space.first_kept"}
+WRITTEN = {"variable"}
 """Arrays of a plan that the C source writes."""
+MOVED = {"slots", "slot_on", "slot_off", "slot_place", "space.first_kept"}
+"""Those that it writes where tasks move to other levels."""
 
 
 def frozen(found: Exported) -> Frozen:
     """Tell what never changes of an exported controller: all sizes, its robot, options and limits."""
     image = found.image
-    arrays = list(arrays_of(TICK, found.plan.tick))
+    arrays = list(arrays_of(TICK, found.plan.tick, WRITTEN | MOVED if found.moves else WRITTEN))
     changing = np.zeros(image.words.size, bool)
     for name, array, stays in arrays:
         if name in image.first and not stays:
@@ -49,13 +52,20 @@ def frozen(found: Exported) -> Frozen:
 
 
 def arrays_of(
-    table: RecordTable, record: Record, before: str = ""
+    table: RecordTable, record: Record, written: AbstractSet[str], before: str = ""
 ) -> Iterator[tuple[str, np.ndarray, bool]]:
-    """List all arrays by name, and whether each stays what it is."""
+    """List all arrays by name, and whether each stays what it is.
+
+    Args:
+        table: What describes the record.
+        record: The record.
+        written: Names of arrays of a plan that somebody writes.
+        before: What the names begin with.
+    """
     for field in table.fields:
         name, value = before + field.name, getattr(record, field.name)
         if field.of is not None:
-            yield from arrays_of(field.of, value, f"{name}.")
+            yield from arrays_of(field.of, value, written, f"{name}.")
             continue
         fixed = field.writer == field.lives == "plan" or field.writer == field.lives == "robot"
-        yield name, value, fixed and name not in WRITTEN and not name.startswith("stance.")
+        yield name, value, fixed and name not in written and not name.startswith("stance.")
