@@ -365,6 +365,14 @@ def bench(
     readable: Annotated[
         bool, typer.Option("--readable", help="Time the readable form of the tick as well.")
     ] = False,
+    in_c: Annotated[
+        bool,
+        typer.Option(
+            "--in-c",
+            help="Time exported controllers as well, with the kernels of all and with their own; "
+            "needs a C compiler and some minutes for each scene.",
+        ),
+    ] = False,
     changes: Annotated[
         int, typer.Option(help="Time so many changes of a stack of each kind as well.", min=0)
     ] = 0,
@@ -386,6 +394,7 @@ def bench(
 ) -> None:
     """Time the tick, in turns with the model's own calls and with other controllers."""
     from opspace.bench import (
+        SCENES,
         Benchmark,
         changes_table,
         compare_runs,
@@ -393,6 +402,7 @@ def bench(
         worst_table,
     )
     from opspace.errors import InputError
+    from opspace.export.timed_in_c import check_in_c, timed_in_c
     from opspace.plots import save
     from opspace.plots.benchmark import benchmark_figure
 
@@ -408,10 +418,20 @@ def bench(
         if not scenes:
             return
 
+    if in_c:
+        check_in_c(scenes or SCENES)
+
     def announce(what: str) -> None:
         print(what, file=sys.stderr)
 
-    found = run_benchmark(scenes or (), ticks, core, readable=readable, announce=announce)
+    found = run_benchmark(
+        scenes or (),
+        ticks,
+        core,
+        readable=readable,
+        more=timed_in_c if in_c else lambda _: {},
+        announce=announce,
+    )
     _print_table(*found.table())
     print()
     _print_table(*found.batch_table())
@@ -828,6 +848,13 @@ def export_as_c(
     moves: Annotated[
         int, typer.Option(help="How many moves and swaps can be on their way at once.")
     ] = 2,
+    own_kernels: Annotated[
+        bool,
+        typer.Option(
+            "--own-kernels",
+            help="Compile kernels for this controller alone: faster, other last bits, takes a minute.",
+        ),
+    ] = False,
     overrides: Annotated[
         list[str] | None,
         typer.Option("--set", metavar="KEY=VALUE", help="Change one value; repeatable."),
@@ -849,6 +876,7 @@ def export_as_c(
         absent=absent or (),
         levels=levels or (),
         moves=moves,
+        own_kernels=own_kernels,
         overwrite=overwrite,
     )
     print(f"results: {out}")

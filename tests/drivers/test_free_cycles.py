@@ -63,6 +63,8 @@ def test_compiled_cycles_give_the_torque_of_python_and_wait_for_nobody(tmp_path)
                 until(loop, lambda: loop._history.seen > first + 600)
             assert hog.times > 0
             assert loop._free._runs
+            told = loop.report.t
+            until(loop, lambda: loop.report.t > told)
             last = loop._history.seen
             controller.stack.insert(guest, level=-1, duration=0.1)
             until(loop, lambda: guest in list(controller.stack) and controller.stack.settled)

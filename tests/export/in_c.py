@@ -68,11 +68,19 @@ class InC:
         return getattr(self.library, f"opspace_{name}")(self.own, *words)
 
     def read(self, name):
+        found = self._numbers(name)
+        return None if found is None else np.array(found)
+
+    def write(self, name, x):
+        """Write where no program may."""
+        found = self._numbers(name)
+        for i in range(len(found)):
+            found[i] = x
+
+    def _numbers(self, name):
         count = ctypes.c_int64()
         found = self.library.opspace_read(self.own, name.encode(), ctypes.byref(count))
-        return (
-            None if found is None else np.array((ctypes.c_double * count.value).from_address(found))
-        )
+        return None if found is None else (ctypes.c_double * count.value).from_address(found)
 
 
 def pointer(array):

@@ -6,6 +6,7 @@ import pytest
 import opspace as osc
 from tests.controller.test_standing_compiled import ROBOTS
 from tests.export.in_c import InC, with_cc
+from tests.export.test_c_library import start
 
 DT = 0.01
 
@@ -75,6 +76,29 @@ def test_contacts_come_and_go_as_in_a_stack(name, tmp_path):
         ]
         statuses.add(status)
     assert any(status & osc.Status.CONTACT_WAITS for status in statuses)
+
+
+@with_cc
+@pytest.mark.parametrize("robot_adds", [None, False, True])
+def test_brakes_give_the_same_bits(robot_adds, tmp_path):
+    """A target that is no number brakes; a robot that stands, from the torque that carried it."""
+    if robot_adds is None:
+        controller, *_ = standing("solo12")
+    else:
+        controller, _ = start(gravity="robot" if robot_adds else "controller")
+    robot = controller.robot
+    c = InC(tmp_path, controller)
+    for k in range(6):
+        chance = np.random.default_rng(k)
+        q = robot.integrate(robot.q_reference, 0.01 * chance.normal(size=robot.nv), 0.2)
+        v = 0.1 * chance.normal(size=robot.nv)
+        if k == 3:
+            controller._plan.tick.goal[:, 0] = np.nan
+            c.write("goal", np.nan)
+        command, (status, tau) = controller.step(DT * k, q, v), c.step(DT * k, q, v)
+        np.testing.assert_array_equal(tau, command.tau, err_msg=f"tick {k}")
+        assert status == command.status
+        assert (k >= 3) == (osc.Status.FAULT in command.status)
 
 
 @with_cc

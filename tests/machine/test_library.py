@@ -128,6 +128,41 @@ def test_without_another_process_it_compiles_by_itself(empty, python):
     assert empty("-c", START.format(python=python)).stdout.split() == LOADED
 
 
+FROZEN = """
+import ctypes
+import small
+from llvmlite import binding as llvm
+from opspace.machine.freeze import Frozen
+from opspace.machine.processor import host
+from opspace.plan.image import image
+numbers = small.NUMBERS.make({}, {"x": small.np.arange(4.0)})
+found = image(numbers.handle())
+constants = ((found.first["x"], 4),)
+roots = {"Numbers": found.handle}
+frozen = Frozen(("add",), found.words, found.addresses, found.handles, roots, constants, True)
+content = small.LIBRARY.object_for(frozen)
+llvm.initialize_native_target()
+llvm.initialize_native_asmprinter()
+engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), host().machine())
+engine.add_object_file(llvm.ObjectFileRef.from_data(content))
+engine.finalize_object()
+add = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_double, ctypes.c_void_p, ctypes.c_int64)(
+    engine.get_function_address("opspace_add")
+)
+count = [add(0.5, None, 10) for _ in range(2)][0]
+place = engine.get_global_value_address("opspace_memory")
+memory = (ctypes.c_double * found.words.size).from_address(place)
+said = ctypes.string_at(engine.get_global_value_address("opspace_stamp")).decode()
+assert said == f"{small.LIBRARY.stamp}-{frozen.stamp}"
+assert engine.get_function_address("opspace_clear") == 0
+print(count, memory[found.first["total"]], memory[found.first["x"] + 1], numbers.total[0])
+"""
+
+
+def test_functions_for_one_record_alone_have_its_memory_and_know_its_numbers(empty):
+    assert empty("-c", FROZEN).stdout.split() == ["4", "124.0", "0.0", "0.0"]
+
+
 MAKE_TO_SHIP = """
 import pathlib, sys
 import small

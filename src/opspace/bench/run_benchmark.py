@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import json
 import platform
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib import metadata
 from pathlib import Path
 
 import numpy as np
 
-from opspace.bench.scenes import SCENES
+from opspace.bench.scenes import SCENES, Scene
 from opspace.bench.states_per_second import states_per_second
-from opspace.bench.subjects import LIBRARY, MODEL, PLACO, subjects
-from opspace.bench.timing import interleaved, pinned, slowest_state
+from opspace.bench.subjects import LIBRARY, MODEL, PLACO, Tick, subjects
+from opspace.bench.timing import Timed, interleaved, pinned, slowest_state
 from opspace.errors import InputError, unknown_name
 
 PACKAGES = ("opspace", "numba", "numpy", "pin", "mujoco", "placo")
@@ -97,6 +97,7 @@ def run_benchmark(
     core: int | None = None,
     *,
     readable: bool = False,
+    more: Callable[[Scene], Mapping[str, Timed]] = lambda _: {},
     announce: Callable[[str], None] = lambda _: None,
 ) -> Benchmark:
     """Time scenes.
@@ -106,6 +107,7 @@ def run_benchmark(
         ticks: Ticks of every subject, and states of a batch.
         core: Core to stay on for single ticks; None leaves it to the system.
         readable: Time the readable form of the tick as well.
+        more: Gives what else is to be timed in a scene, by name.
         announce: Told what is timed next.
 
     Returns:
@@ -126,7 +128,7 @@ def run_benchmark(
         for name in names or SCENES:
             announce(f"{name}: {SCENES[name].title}")
             scene = SCENES[name]
-            timed = subjects(scene, readable)
+            timed: dict[str, Tick | Timed] = {**subjects(scene, readable), **more(scene)}
             q, v = scene.states(scene.robot())
             times = interleaved(timed, q, v, ticks)
             found.scenes[name] = {subject: _summary(x, len(q)) for subject, x in times.items()}

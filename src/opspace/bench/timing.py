@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import gc
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from contextlib import contextmanager
 from time import perf_counter_ns
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -17,6 +17,17 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from opspace.bench.subjects import Tick
+
+
+class Timed(NamedTuple):
+    """A subject that times its ticks itself, outside of Python.
+
+    Attributes:
+        block: Takes (states, n) configurations and velocities, and fills (count,) durations, µs.
+    """
+
+    block: Callable[[np.ndarray, np.ndarray, np.ndarray], None]
+
 
 BLOCK = 500
 """Ticks of one subject before the next one has its turn: clocks change, and all must feel it."""
@@ -43,7 +54,7 @@ def pinned(core: int | None) -> Iterator[None]:
 
 
 def interleaved(
-    ticks: Mapping[str, Tick],
+    ticks: Mapping[str, Tick | Timed],
     q: np.ndarray,
     v: np.ndarray,
     count: int,
@@ -59,15 +70,23 @@ def interleaved(
     Returns:
         By name (count,) durations, µs.
     """
+    q, v = np.ascontiguousarray(q), np.ascontiguousarray(v)
     states = list(zip(q, v, strict=True))
+
+    def block(tick: Tick | Timed, into: np.ndarray) -> None:
+        if isinstance(tick, Timed):
+            tick.block(q, v, into)
+        else:
+            _block(tick, states, into)
+
     found = {name: np.zeros(count) for name in ticks}
     for tick in ticks.values():
-        _block(tick, states, np.zeros(BLOCK))
+        block(tick, np.zeros(BLOCK))
     gc.collect()
     for start in range(0, count, BLOCK):
         end = min(start + BLOCK, count)
         for name, tick in ticks.items():
-            _block(tick, states, found[name][start:end])
+            block(tick, found[name][start:end])
     return found
 
 

@@ -53,6 +53,7 @@ from opspace.machine.answer_call import layout_is_known
 from opspace.machine.record import Handle
 from opspace.plan.entries import KERNELS
 from opspace.plan.pack_contacts import ContactTick, PackedContacts, fits
+from opspace.plan.pack_integrals import PackedIntegrals
 from opspace.plan.plan import Heritage, Plan, structure
 from opspace.plan.quiet_call import QuietCall
 from opspace.plan.quiet_records import QUIET
@@ -211,7 +212,8 @@ class Controller(ReferenceController):
         if answer < 0:
             if answer == STATE_NOT_FINITE:
                 robot.check_state(robot.q, robot.v)
-            return self._hold(t, STATUSES[timing | FAULT])
+            inertia, bias = plan.tick.M, plan.tick.bias  # what C brakes with, too
+            return self._hold(t, STATUSES[timing | FAULT], inertia, bias)
         tau = torque()
         if stands:
             footing = self._stood(tau)
@@ -235,6 +237,10 @@ class Controller(ReferenceController):
         if plan is None or plan.distances is None:
             return super().placings
         return plan.distances.layout.by_name(plan.distances.placings)
+
+    @property
+    def _compiled_integrals(self) -> PackedIntegrals | None:
+        return None if self._laid_out is None else self._laid_out[1].integrals
 
     @property
     def _inertia(self) -> np.ndarray:

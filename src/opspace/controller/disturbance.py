@@ -6,8 +6,7 @@ import math
 
 import numpy as np
 
-LONGEST = 0.05
-"""Ticks further apart tell nothing about one torque, s."""
+from opspace.law.scalars import LONGEST_LESSON
 
 
 class DisturbanceObserver:
@@ -39,7 +38,7 @@ class DisturbanceObserver:
             v: (n,) joint velocity, rad/s.
         """
         dt = t - self._t
-        if 0.0 < dt <= LONGEST:
+        if 0.0 < dt <= LONGEST_LESSON:
             found = (v - self._v) / dt - self._commanded
             if np.all(np.isfinite(found)):
                 self.acceleration += min(1.0, dt / self._time) * (found - self.acceleration)

@@ -100,14 +100,17 @@ def exported(
     plan = controller._planned_apart(_with_room(rested, numbers, moves, profile), axes)
     for packed in plan.packed:
         if not packed.settled:
+            packed.pack_value()  # what its integral adds comes later
+        if not packed.settled:
             raise InputError(_reason(packed))
     if plan.contacts is not None:
         everything = [ContactMember(contact, 1.0, 1.0) for contact in contacts]
         plan.contacts.begin(everything, robot, 0.0)
+    beside = {} if plan.integrals is None else {"integrals": plan.integrals.handle}
     return Exported(
         robot,
         plan,
-        image(plan.handle),
+        image(plan.handle, **beside),
         controller._rules.period,
         controller._robot_adds,
         numbers,
@@ -183,8 +186,6 @@ def _reason(packed: Packed) -> str:
         why = "will hold what it finds at its first tick: give it a target"
     elif task._gains.max_acceleration is not None:
         why = "has a max_acceleration, which is kept in Python: send it targets that go on smoothly"
-    elif task.ki is not None:
-        why = "has a ki: integral action is in Python"
     else:
         why = "follows a reference in time: give it a target, and set later ones from C"
     return f"task {task.name!r} {why}"

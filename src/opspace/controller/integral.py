@@ -7,7 +7,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from opspace.command import Command, LevelStatus, Status
-from opspace.controller.disturbance import LONGEST
+from opspace.law.scalars import LONGEST_LESSON
+from opspace.plan.pack_integrals import PackedIntegrals
 from opspace.plan.scales import Scales
 from opspace.robots.protocol import Robot
 from opspace.stack import Member
@@ -38,21 +39,33 @@ class IntegralAction:
         self._scales = scales
         self._before: float | None = None
 
-    def after(self, command: Command, members: Sequence[Member]) -> None:
+    def after(
+        self,
+        command: Command,
+        members: Sequence[Member],
+        compiled: PackedIntegrals | None = None,
+    ) -> None:
         """Learn from the errors of a tick.
 
         Args:
             command: Its answer.
             members: Its tasks.
+            compiled: What does it for all of them, where compiled code has ticked.
         """
         before, self._before = self._before, command.t
-        if before is None or not 0.0 < command.t - before <= LONGEST or command.status & FROZEN:
+        if before is None:
+            return
+        dt = command.t - before
+        if not 0.0 < dt <= LONGEST_LESSON or command.status & FROZEN:
+            return
+        if compiled is not None:
+            compiled.learn(dt, int(command.status))
             return
         rows = {member.task.name: member.task.rows for member in members}
         for member in members:
             task = member.task
             if isinstance(task, TrackingTask) and task.ki is not None:
-                self._integrate(task, command, rows, command.t - before)
+                self._integrate(task, command, rows, dt)
 
     def _integrate(
         self, task: TrackingTask, command: Command, rows: Mapping[str, int], dt: float

@@ -25,6 +25,7 @@ from opspace.controller.wrenches import Wrenches, WrenchInput
 from opspace.errors import InputError, unknown_name
 from opspace.law import Profile
 from opspace.law.scalars import MAY_GIVE_UP
+from opspace.plan.pack_integrals import PackedIntegrals
 from opspace.plan.scales import DEFAULT_SINGULARITY, Scales, Singularity
 from opspace.robots.adapter import AdapterBase
 from opspace.robots.motor_range import motor_range
@@ -337,7 +338,7 @@ class ReferenceController:
     def _finished(self, command: Command, members: Sequence[Member]) -> Command:
         """Learn from a tick, leave out what the robot adds, mix with another's torque in a handover."""
         if self._handover is None and self._integral is not None:
-            self._integral.after(command, members)
+            self._integral.after(command, members, self._compiled_integrals)
         if self._fall is not None:
             command = self._fall.after(command, self.stack.hindrance * MAY_GIVE_UP, self._inertia)
             self._last_torque = command.tau
@@ -352,6 +353,11 @@ class ReferenceController:
             self._handover = None
             self._plain, self._quiet = self._needs_no_more(), None
         return command._replace(tau=tau, status=command.status | Status.HANDOVER)
+
+    @property
+    def _compiled_integrals(self) -> PackedIntegrals | None:
+        """What learns from errors where compiled code has ticked."""
+        return None
 
     @property
     def _inertia(self) -> np.ndarray:
@@ -494,21 +500,32 @@ class ReferenceController:
     def _holds(self) -> bool:
         return self._timing is not None and self._timing.policy == "hold"
 
-    def _hold(self, t: float, status: Status) -> Command:
-        """Brake in a tick that cannot be trusted."""
+    def _hold(
+        self,
+        t: float,
+        status: Status,
+        inertia: np.ndarray | None = None,
+        bias: np.ndarray | None = None,
+    ) -> Command:
+        """Brake in a tick that cannot be trusted, with the robot's own inertia and bias or these."""
         if self._observer is not None:
             self._observer.forget_last()
-        tau = self._braking() - self._added_by_robot()
+        tau = self._braking(inertia, bias) - self._added_by_robot()
         return Command(t, tau, status, 0, Found({}, (), {}))
 
-    def _braking(self) -> np.ndarray:
+    def _braking(
+        self, inertia: np.ndarray | None = None, bias: np.ndarray | None = None
+    ) -> np.ndarray:
         """Bias with joint damping, inside the motors' limits; finite whatever the model says.
 
         On a floating base it is the last torque with joint damping: the bias alone carries nothing.
         """
         robot = self.robot
-        held = robot.bias if self._last_torque is None else self._last_torque
-        tau = held - self.damping * robot.M.diagonal() * robot.v
+        inertia = robot.M if inertia is None else inertia
+        held = self._last_torque
+        if held is None:
+            held = robot.bias if bias is None else bias
+        tau = held - self.damping * inertia.diagonal() * robot.v
         limit, middle = motor_range(robot)
         limit = np.minimum(limit, np.finfo(float).max)
         limit[: self._base] = 0.0

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import hashlib
 import re
 from collections.abc import Iterator, Sequence
 from importlib import metadata
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -15,9 +17,11 @@ from opspace.controller.exported import Exported, exported
 from opspace.controller.reference import ReferenceController
 from opspace.controller.watchdog import JUMP, MISSED
 from opspace.errors import InputError
+from opspace.export.own_kernels import frozen
 from opspace.kernels import columns, stance_columns
 from opspace.law import PROFILES, press_columns
 from opspace.law.scalars import MAY_GIVE_UP, NO_GROUP, TANH_EDGE
+from opspace.machine.freeze import MEMORY, Frozen
 from opspace.machine.processor import host
 from opspace.plan.entries import KERNELS
 from opspace.plan.pack_task import Packed
@@ -43,9 +47,10 @@ PRESS = ("GIVEN", "GIVEN_AT", "WANTED", "FORCES", "ON", "KI", "KP", "PRESS_SIZE"
 INNER = (
     "space.first_kept",
     *(f"stance.{name}" for name in ("count", "rows", "place", "edges", "numbers", "motion")),
+    *(f"integrals.{name}" for name in ("ki", "integral", "joint_integral", "since")),
     *(f"stance.{name}" for name in ("force", "most", "cone", "metric", "reference", "hindrance")),
 )
-"""Arrays of records in the record of a tick that the C source writes."""
+"""Arrays of records in the record of a tick, or beside it, that the C source writes."""
 CMAKE = """\
 cmake_minimum_required(VERSION 3.13)
 project(opspace_{name} LANGUAGES C)
@@ -75,6 +80,7 @@ def export_c(
     levels: Sequence[float] = (),
     moves: int = 2,
     profile: str = "quintic",
+    own_kernels: bool = False,
     overwrite: bool = False,
 ) -> Path:
     """Write a controller as files that a C or C++ program is linked with.
@@ -91,6 +97,9 @@ def export_c(
         moves: How many moves and swaps can be on their way at once; each has its memory and its part
             of a tick.
         profile: Profile of all transitions, see `opspace.Profile`.
+        own_kernels: Compile kernels for this controller alone, which takes as long as compiling all
+            of them. They know its sizes and its robot, which makes them faster; the torque differs
+            from that of `Controller.step` in its last bits, and a program has one of it at a time.
         overwrite: Replace files that are already there.
 
     Returns:
@@ -106,12 +115,13 @@ def export_c(
     if not NAME.fullmatch(name) or name.startswith("opspace"):
         raise InputError(f"{name!r} is no name for a model in C: letters, digits and _")
     found = exported(controller, absent, profile, levels, moves)
+    own = frozen(found) if own_kernels else None
     files = {
         "opspace_codes.h": _codes().encode(),
         "opspace_layout.h": _layout().encode(),
         f"{name}.h": _header(name, found).encode(),
-        f"{name}.c": _source(name, found, PROFILES.index(profile)).encode(),
-        "opspace_kernels.o": KERNELS.object(),
+        f"{name}.c": _source(name, found, PROFILES.index(profile), own).encode(),
+        "opspace_kernels.o": KERNELS.object() if own is None else KERNELS.object_for(own),
         "CMakeLists.txt": CMAKE.format(name=name, sources=" ".join(_c_sources())).encode(),
         **{path.name: path.read_bytes() for path in sorted(SOURCES.iterdir())},
     }
@@ -182,7 +192,13 @@ def _layout() -> str:
     }
     lines += [f"#define {word} {x}\n" for word, x in whole.items()]
     lines += [f"#define {word} {float(x)!r}\n" for word, x in numbers.items()]
+    lines.append(f'#define OPSPACE_MODEL_FORM "{_form()}"\n')
     return f"{_written()}{''.join(lines)}"
+
+
+def _form() -> str:
+    """Return what changes with the structure of a model in C."""
+    return hashlib.sha256((SOURCES / "opspace.h").read_bytes()).hexdigest()[:16]
 
 
 def _header(name: str, found: Exported) -> str:
@@ -207,7 +223,7 @@ def _header(name: str, found: Exported) -> str:
     )
 
 
-def _source(name: str, found: Exported, profile: int) -> str:
+def _source(name: str, found: Exported, profile: int, own: Frozen | None) -> str:
     """Write the numbers of the model."""
     words, runs = found.image.words, list(_runs(found.image.words))
     content = [format(x, "#x") for first, count in runs for x in words[first : first + count]]
@@ -235,19 +251,22 @@ def _source(name: str, found: Exported, profile: int) -> str:
     data = "".join(
         f"static {declared}[] = {{\n{_wrapped(items)}}};\n" for declared, items in arrays.items()
     )
+    memory = f"extern uint64_t {MEMORY}[];\n\n" if own else ""
     members = [
-        _text(KERNELS.stamp),
+        _text(f"{KERNELS.stamp}-{f'{own.stamp}-' if own else ''}{_form()}"),
         *map(str, (found.plan.n, found.robot.nq, len(tasks))),
         *("joint", "task", str(found.moves), str(profile), str(len(found.levels)), "level"),
         *(str(found.base), str(len(found.robot.description.quaternions)), "quaternion"),
         *(str(len(found.contacts)), "contact", "fall" if found.fall else "0"),
         *(str(len(fields)), "field"),
         *(repr(found.period), str(int(found.robot_adds))),
-        *map(str, (words.size, found.image.handle, len(runs))),
+        *map(str, (words.size, found.image.handle)),
+        *(str(found.image.beside.get("integrals", -1)), str(len(runs))),
         *("run", "content", str(found.image.addresses.size), "address"),
+        MEMORY if own else "0",
     ]
     return (
-        f'{_written()}#include "{name}.h"\n\n{data}\n'
+        f'{_written()}#include "{name}.h"\n\n{memory}{data}\n'
         f"const opspace_model {name} = {{\n{_wrapped(members)}}};\n"
     )
 
@@ -298,7 +317,11 @@ def _target(packed: Packed, kind: np.ndarray) -> tuple[int, int, int]:
 
 
 def _size(found: Exported, name: str) -> int:
-    record = found.plan.tick
+    record: Any = found.plan.tick
+    first, _, rest = name.partition(".")
+    if first in found.image.beside:
+        assert found.plan.integrals is not None
+        record, name = found.plan.integrals.record, rest
     for part in name.split("."):
         record = getattr(record, part)
     return record.size

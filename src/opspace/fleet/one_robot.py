@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 
 from opspace.command import Status
-from opspace.fleet.integral_sums import forget_sum, learn, push
 from opspace.fleet.led_targets import forget_way, lead, look_at_robot
 from opspace.fleet.wrenches_of_robot import (
     STALE,
@@ -36,6 +35,7 @@ from opspace.kernels.columns import (
     TURN,
 )
 from opspace.kernels.compiled_scalars import ramp
+from opspace.kernels.integrals import forget_sum, learn, push
 from opspace.kernels.many_states import brake
 from opspace.kernels.motion import P, R, measure
 from opspace.kernels.task_rows import _quaternion

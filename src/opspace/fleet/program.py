@@ -11,10 +11,10 @@ import numpy as np
 from opspace.fleet.exact_limits import EXACTLY, rests_of
 from opspace.fleet.fleet_kernel import fleet_kernel
 from opspace.fleet.given_motion import INSTEAD
-from opspace.fleet.integral_sums import WITHOUT
 from opspace.fleet.kernels_in_cpp import translate
 from opspace.fleet.layout import LANES, RobotLayout
 from opspace.fleet.led_targets import WITHOUT_WAYS
+from opspace.fleet.no_integrals import WITHOUT
 from opspace.fleet.one_robot import robot_tick
 from opspace.fleet.precision import constants_of
 from opspace.fleet.robot_record import ROBOT, WAYS

@@ -84,7 +84,8 @@ def tick(t, work):
     evaluate_tasks(work, moved)
     balance(work)
     stacks = blend(work)
-    whiten_tasks(work)
+    if not whiten_tasks(work):
+        return NOT_FINITE
     limit_stacks = 0
     if work.limit.shape[0] > 0:
         begin_limits(work)
@@ -196,6 +197,9 @@ def whiten_tasks(work):
     """Rows Ĵ = W J U⁻ᵀ and f̂ = W f̃ of every task, and what damps the rest.
 
     Reads J (rows, n), wanted and drift (rows,); writes Jw (rows, n), fw (rows,) [√J/s], rest (n + 1,).
+
+    Returns:
+        Whether all f̂ are finite: a level without motions would pass over one that is not.
     """
     n = work.v.shape[0]
     if work.option[TASK_BIAS] != 0.0:
@@ -211,6 +215,10 @@ def whiten_tasks(work):
     work.rest[n] = 0.0
     if not covered and work.option[DAMPING] != 0.0:
         damp_rest(work, n)
+    none = 0.0
+    for row in range(work.error.shape[0]):
+        none += 0.0 * work.fw[row]
+    return none == 0.0
 
 
 @jit

@@ -222,6 +222,9 @@ noisy, rad or m."""
 TOO_FAST = 5e-5
 """A joint that is too fast by less loses it before it passes its limit by more, rad/s or m/s."""
 
+LONGEST_LESSON = 0.05
+"""Ticks further apart tell nothing about one torque, s."""
+
 ADMISSIBLE, BUFFER = range(2)
 
 

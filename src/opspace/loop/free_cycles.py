@@ -105,6 +105,11 @@ class FreeCycles:
         """What the cycles that go on now have counted."""
         return Counts(*self._count.tolist())
 
+    @property
+    def last(self) -> float | None:
+        """Time of the last state while cycles go on, s."""
+        return self._ready[2].number[c.LAST].item() if self._runs and self._ready else None
+
     def ready(self) -> bool:
         """Whether the next cycle can be without Python."""
         return self._ready is not None and self._ready[0] is free_plan(self._controller)

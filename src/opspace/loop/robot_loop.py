@@ -259,12 +259,20 @@ class Loop:
         return self._history.cycles()
 
     @property
+    def _last_time(self) -> float:
+        """Time of the last state, s; NaN before the first."""
+        freely = None if self._free is None else self._free.last
+        if freely is not None:
+            return freely
+        return np.nan if self._last is None else self._last.t
+
+    @property
     def report(self) -> LoopReport:
         """How it went so far."""
         return LoopReport(
             completed=self._completed,
             reason=self._reason,
-            t=np.nan if self._last is None else self._last.t,
+            t=self._last_time,
             counts=self._counts + (Counts() if self._free is None else self._free.counts),
             seen=self._seen,
             standstill=self._standstill,

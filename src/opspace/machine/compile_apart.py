@@ -10,13 +10,14 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from opspace.machine.freeze import Frozen
 from opspace.machine.processor import Processor
 
 log = logging.getLogger("opspace")
 
 PROGRAM = """
 import os, pickle, sys
-answer = os.dup(1)
+answer, frozen = os.dup(1), sys.stdin.buffer.read()
 os.dup2(2, 1)  # whatever is printed on the way is no part of the object
 sys.path[:] = {path!r}
 from opspace.machine.translate import translate_only
@@ -25,16 +26,20 @@ from {module} import ENTRIES
 from opspace.machine.compile_object import compile_objects
 from opspace.machine.processor import Processor
 with os.fdopen(answer, "wb") as answer:
-    pickle.dump(compile_objects(ENTRIES, [Processor(*one) for one in {processors!r}]), answer)
+    processors = [Processor(*one) for one in {processors!r}]
+    pickle.dump(compile_objects(ENTRIES, processors, pickle.loads(frozen)), answer)
 """
 
 
-def compile_apart(module: str, processors: Sequence[Processor]) -> list[bytes] | None:
+def compile_apart(
+    module: str, processors: Sequence[Processor], frozen: Frozen | None = None
+) -> list[bytes] | None:
     """Have another process compile, and wait for it.
 
     Args:
         module: Module with the ``ENTRIES``.
         processors: What for.
+        frozen: Records that they are compiled for alone; None is any.
 
     Returns:
         The object for each, None where no other process can be started.
@@ -51,7 +56,7 @@ def compile_apart(module: str, processors: Sequence[Processor]) -> list[bytes] |
         done = subprocess.run(
             [sys.executable, "-c", program],
             env=environment,
-            stdin=subprocess.DEVNULL,
+            input=pickle.dumps(frozen),
             capture_output=True,
             check=True,
         )

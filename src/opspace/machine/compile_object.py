@@ -19,6 +19,7 @@ from numba.core import config as settings
 from numba.core.compiler_lock import global_compiler_lock
 
 from opspace.machine.field_table import RecordTable
+from opspace.machine.freeze import MEMORY, Frozen, freeze
 from opspace.machine.handle_type import array_at, array_type, handle_type
 from opspace.machine.kernel_entry import Argument, KernelEntry, stamp_of
 from opspace.machine.processor import Processor
@@ -37,7 +38,11 @@ VECTOR = array_type(np.dtype(float), 1)
 TYPES: dict[Any, Any] = {float: types.float64, int: types.int64, np.ndarray: VECTOR}
 
 
-def compile_objects(entries: Sequence[KernelEntry], processors: Sequence[Processor]) -> list[bytes]:
+def compile_objects(
+    entries: Sequence[KernelEntry],
+    processors: Sequence[Processor],
+    frozen: Frozen | None = None,
+) -> list[bytes]:
     """Compile entries and everything that they call.
 
     Numba only translates. LLVM optimises once, when all is in one piece: done function by function,
@@ -47,6 +52,7 @@ def compile_objects(entries: Sequence[KernelEntry], processors: Sequence[Process
     Args:
         entries: The functions.
         processors: What for; none of them need be the one that this is run on.
+        frozen: Records that the entries it names are compiled for alone; None is any.
 
     Returns:
         The object file for each.
@@ -54,24 +60,35 @@ def compile_objects(entries: Sequence[KernelEntry], processors: Sequence[Process
     Raises:
         ImportError: A kernel asks for something that is neither here nor in C's library.
     """
+    stamp = stamp_of(entries)
+    if frozen is not None:
+        entries = [entry for entry in entries if entry.name in frozen.names]
+        stamp = f"{stamp}-{frozen.stamp}"
     with _translated_only(), global_compiler_lock:
-        text = _translation(entries)
+        text = _translation(entries, stamp)
     llvm.initialize_all_targets()
     llvm.initialize_all_asmprinters()
-    return [_compiled(text, entries, processor) for processor in processors]
+    return [_compiled(text, entries, processor, frozen) for processor in processors]
 
 
-def _compiled(text: str, entries: Sequence[KernelEntry], processor: Processor) -> bytes:
+def _compiled(
+    text: str,
+    entries: Sequence[KernelEntry],
+    processor: Processor,
+    frozen: Frozen | None,
+) -> bytes:
     module = llvm.parse_assembly(text)
+    if frozen is not None:
+        freeze(module, entries, frozen)
     machine = processor.machine()
     module.triple, module.data_layout = processor.triple, str(machine.target_data)
-    seen = {STAMP, *(entry.symbol for entry in entries)}
+    seen = {STAMP, MEMORY, *(entry.symbol for entry in entries)}
     parts = [*module.functions, *module.global_variables]
     for number, part in enumerate(parts):
         if not part.is_declaration and part.name not in seen:
             part.linkage = "internal"
             part.name = f"part{number}"  # numba's names hold numbers that another run has not
-    _optimise(module, machine)
+    _optimise(module, machine, vectorise=frozen is None or frozen.vectorise)
     asked = {f.name for f in module.functions if f.is_declaration}
     if foreign := {name for name in asked if not name.startswith("llvm.")} - LIBRARY:
         raise ImportError(f"compiled kernels ask for {', '.join(sorted(foreign))}")
@@ -90,7 +107,7 @@ def _translated_only() -> Iterator[None]:
         config.OPT = before
 
 
-def _translation(entries: Sequence[KernelEntry]) -> str:
+def _translation(entries: Sequence[KernelEntry], stamp: str) -> str:
     """Return LLVM's form of the entries and of everything that they call, as text."""
     kernels: list[Any] = [getattr(importlib.import_module(e.module), e.name) for e in entries]
     context = kernels[0].targetctx
@@ -102,7 +119,7 @@ def _translation(entries: Sequence[KernelEntry]) -> str:
         compiled = kernel.overloads[signature]
         library.add_linking_library(compiled.library)
         _define(entry, compiled.fndesc, context, module)
-    said = cgutils.make_bytearray(stamp_of(entries).encode() + bytes(1))
+    said = cgutils.make_bytearray(stamp.encode() + bytes(1))
     cgutils.global_constant(module, STAMP, said, linkage="")
     library.add_ir_module(module)
     library.finalize()
@@ -139,9 +156,9 @@ def _define(entry: KernelEntry, found: Any, context: Any, module: Any) -> None:
         builder.ret(result)
 
 
-def _optimise(module: Any, machine: Any) -> None:
+def _optimise(module: Any, machine: Any, *, vectorise: bool) -> None:
     options = llvm.create_pipeline_tuning_options(speed_level=2)
-    options.loop_vectorization = True
+    options.loop_vectorization = vectorise
     options.slp_vectorization = False
     builder = llvm.create_pass_builder(machine, options)
     passes = builder.getModulePassManager()

@@ -12,6 +12,7 @@ from typing import Any
 from llvmlite import binding as llvm
 
 from opspace.machine.compile_apart import compile_apart
+from opspace.machine.freeze import Frozen
 from opspace.machine.kept_object import keep, read, read_shipped, sealed, writable
 from opspace.machine.kernel_entry import KernelEntry, stamp_of
 from opspace.machine.processor import SHIPPED, Processor, host
@@ -74,6 +75,11 @@ class Library:
         """Return the object for this machine, compiled before or now, for a linker."""
         return self._found(host())
 
+    def object_for(self, frozen: Frozen) -> bytes:
+        """Compile some of the functions for some records alone, for a linker on this machine."""
+        (made,) = self._made((host(),), frozen)
+        return made
+
     def to_ship(self) -> dict[str, bytes]:
         """Compile for every processor of `SHIPPED`.
 
@@ -119,12 +125,12 @@ class Library:
         log.warning("compiled the control tick in %.0f s%s", time.perf_counter() - start, after)
         return found or made
 
-    def _made(self, processors: Sequence[Processor]) -> list[bytes]:
-        made = compile_apart(self._module, processors)
+    def _made(self, processors: Sequence[Processor], frozen: Frozen | None = None) -> list[bytes]:
+        made = compile_apart(self._module, processors, frozen)
         if made is None:
             from opspace.machine.compile_object import compile_objects  # noqa: PLC0415 - only now
 
-            made = compile_objects(self._entries, processors)
+            made = compile_objects(self._entries, processors, frozen)
         return made
 
     def _linked(self, content: bytes, processor: Processor) -> dict[str, Any]:

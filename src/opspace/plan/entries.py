@@ -7,6 +7,7 @@ import numpy as np
 from opspace.machine.answer_call import AnswerParts
 from opspace.machine.kernel_entry import KernelEntry
 from opspace.machine.library import Library
+from opspace.plan.integral_records import INTEGRALS
 from opspace.plan.quiet_records import QUIET
 from opspace.plan.records import CYCLES, SPECTRUM, STATES, TICK
 
@@ -24,6 +25,7 @@ ENTRIES = (
     KernelEntry("opspace.kernels.cycles", "cycles", (TICK, CYCLES), gives=int, releases=True),
     KernelEntry("opspace.kernels.spectrum", "spectrum", (SPECTRUM,)),
     KernelEntry("opspace.kernels.gravity", "gravity", (TICK,)),
+    KernelEntry("opspace.kernels.integrals", "learn", (TICK, INTEGRALS, int)),
 )
 
 KERNELS = Library(__name__, ENTRIES)

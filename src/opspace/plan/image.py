@@ -20,20 +20,25 @@ class Image(NamedTuple):
     Attributes:
         words: (N,) uint64, the contents; an address counts words from the first one.
         addresses: Which words are addresses.
+        handles: Word from which on there are handles.
         handle: Word where the handle of the record begins.
-        first: Word where each array of the record begins, by name; those of a record in it have its
-            name and a dot before theirs. Those without numbers are not there.
+        beside: The same of the others, by name.
+        first: Word where each array of the record begins, by name; those of a record in it, or beside
+            it, have its name and a dot before theirs. Those without numbers are not there.
     """
 
     words: np.ndarray
     addresses: np.ndarray
+    handles: int
     handle: int
+    beside: dict[str, int]
     first: dict[str, int]
 
 
-def image(handle: Handle) -> Image:
-    """Copy everything that a handle leads to; what shares memory shares it in the copy."""
-    regions = _regions(sorted({_extent(array) for array in _arrays(handle)}))
+def image(handle: Handle, **beside: Handle) -> Image:
+    """Copy everything that handles lead to; what shares memory shares it in the copy."""
+    arrays = (array for one in (handle, *beside.values()) for array in _arrays(one))
+    regions = _regions(sorted({_extent(array) for array in arrays}))
     words = [_content(*region) for region in regions]
     ends = np.cumsum([part.size for part in words]).tolist()
     begins = dict(zip((start for start, _ in regions), [0, *ends[:-1]], strict=True))
@@ -65,9 +70,10 @@ def image(handle: Handle) -> Image:
         addresses.extend(begin + i for i in relative)
         return begin
 
-    begin = put(handle)
-    found = {name: place(field) for name, field in _named(handle) if field.size}
-    return Image(np.concatenate(words), np.array(sorted(addresses)), begin, found)
+    begin, others = put(handle), {name: put(one) for name, one in beside.items()}
+    named = [*_named(handle), *(x for name, one in beside.items() for x in _named(one, f"{name}."))]
+    found = {name: place(field) for name, field in named if field.size}
+    return Image(np.concatenate(words), np.array(sorted(addresses)), ends[-1], begin, others, found)
 
 
 def _arrays(handle: Handle) -> Iterator[np.ndarray]:

@@ -261,6 +261,11 @@ class Packed:
         self._tick.own[self.index] = 1.0
 
     @property
+    def joints(self) -> bool:
+        """Whether the kernels know it as a task of joints."""
+        return bool(self._tick.kind[self.index, KIND] == JOINTS)
+
+    @property
     def _changed(self) -> bool:
         """Whether something is to be packed."""
         task = self.task
@@ -357,6 +362,11 @@ class Packed:
 
     def _pack_ahead(self) -> None:
         """Pack what is known before the tick, from any thread; `refresh` sees what changes later."""
+        if getattr(self.task, "ki", None) is None:
+            self.pack_value()
+
+    def pack_value(self) -> None:
+        """Pack a target that stays what it is, without what an integral adds; no other one."""
         task = self.task
         if self.own_kind or type(task).desired is not TrackingTask.desired:
             return
@@ -366,7 +376,7 @@ class Packed:
             if held is None or held[0] is not goal:
                 return
             goal = held[1]
-        elif callable(goal) or task._gains.max_acceleration is not None or task.ki is not None:
+        elif callable(goal) or task._gains.max_acceleration is not None:
             return
         sample = Sample(goal, target.velocity, target.acceleration)
         self._write(sample, target, held, task._gains)
@@ -391,7 +401,7 @@ class Packed:
             if limited:
                 most = slice(MAX_SPEED, MAX_SPEED + len(gains.max_speed))
                 tick.numbers[self.index, most] = gains.max_speed
-        if tick.kind[self.index, KIND] == JOINTS:
+        if self.joints:
             tick.goal[rows, 0], tick.goal[rows, 1], tick.goal[rows, 2] = desired
         else:
             self._pack_goal(desired)

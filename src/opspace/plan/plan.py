@@ -29,6 +29,7 @@ from opspace.plan.memory import Sizes, make_tick
 from opspace.plan.pack_contacts import PackedContacts
 from opspace.plan.pack_distances import PackedDistances
 from opspace.plan.pack_force import PackedForce, pack, presses_of
+from opspace.plan.pack_integrals import PackedIntegrals
 from opspace.plan.pack_task import Packed, hides, kind_of
 from opspace.plan.scales import Scales
 from opspace.plan.spectra import Spectra
@@ -156,6 +157,7 @@ class Plan:
         if limits is not None:
             _pack_limits(limits, scales, self.tick)
         self.handle = self.tick.handle()
+        self.integrals = PackedIntegrals.of(self.packed, self.handle)
         self.spectra = Spectra(self.tick.option)
 
     @staticmethod

@@ -19,6 +19,7 @@ from opspace.plan.bound_records import BOUNDS
 from opspace.plan.contact_records import STANCE
 from opspace.plan.cycle_records import CYCLES
 from opspace.plan.distance_records import DISTANCES
+from opspace.plan.integral_records import INTEGRALS
 from opspace.plan.quiet_records import QUIET
 from opspace.robots.bodies import DYNAMICS, RIGID_BODIES
 
@@ -278,4 +279,5 @@ TABLES = (
     SPECTRUM,
     CYCLES,
     QUIET,
+    INTEGRALS,
 )

@@ -167,6 +167,11 @@ class TrackingTask(Task):
         moved = self.integral + self._ki * dt * (basis.T @ error)
         self._integral = np.clip(moved, -most, most)
 
+    def remember_integral(self, integral: Array) -> None:
+        """Take over an integral (k,) that somebody else has computed."""
+        if not np.array_equal(integral, self.integral):
+            self._integral = integral.copy()
+
     def asks_too_much(self, error: Array) -> bool:
         """Tell whether an error (m,) asks for more than ``max_speed``."""
         return self._gains.saturates(error)

@@ -66,6 +66,10 @@ static void find_fields(opspace *c)
     c->slot_off = memory_of(c, "slot_off");
     c->slot_place = memory_of(c, "slot_place");
     c->first_kept = memory_of(c, "space.first_kept");
+    c->sums.ki = memory_of(c, "integrals.ki");
+    c->sums.motion = memory_of(c, "integrals.integral");
+    c->sums.joint = memory_of(c, "integrals.joint_integral");
+    c->sums.since = memory_of(c, "integrals.since");
     c->stance.count = memory_of(c, "stance.count");
     c->stance.rows = memory_of(c, "stance.rows");
     c->stance.place = memory_of(c, "stance.place");
@@ -80,24 +84,55 @@ static void find_fields(opspace *c)
     c->stance.hindrance = memory_of(c, "stance.hindrance");
 }
 
+/* Whether kernels and models are what they were when the model was written. */
+static int made_for_these_kernels(const char *stamp)
+{
+    size_t kernels = strlen(opspace_stamp);
+    return strncmp(stamp, opspace_stamp, kernels) == 0
+        && strcmp(stamp + kernels, "-" OPSPACE_MODEL_FORM) == 0;
+}
+
+/* Whether the memory of kernels of one's own is in use. */
+static int taken;
+
+static uint64_t *take_memory(const opspace_model *m)
+{
+    size_t size = (size_t)m->words * sizeof *m->memory;
+    if (!m->memory)
+        return calloc(1, size);
+    if (__atomic_exchange_n(&taken, 1, __ATOMIC_ACQUIRE))
+        return NULL;
+    return memset(m->memory, 0, size);
+}
+
+static void give_memory_back(const opspace_model *m, uint64_t *words)
+{
+    if (words && words == m->memory)
+        __atomic_store_n(&taken, 0, __ATOMIC_RELEASE);
+    else
+        free(words);
+}
+
 opspace *opspace_open(const opspace_model *model)
 {
-    if (!model || strcmp(model->stamp, opspace_stamp) != 0)
+    if (!model || !made_for_these_kernels(model->stamp))
         return NULL;
     opspace *c = calloc(1, sizeof *c);
     if (!c)
         return NULL;
     c->model = model;
-    c->words = calloc((size_t)model->words, sizeof *c->words);
+    c->words = take_memory(model);
     c->state = calloc((size_t)(model->nq + model->n), sizeof *c->state);
     if (!c->words || !c->state || !opspace_make_ring(c) || !opspace_make_places(c)
-        || !opspace_make_contacts(c) || !opspace_make_fall(c)) {
+        || !opspace_make_contacts(c) || !opspace_make_fall(c) || !opspace_make_integrals(c)) {
         opspace_close(c);
         return NULL;
     }
     c->last = c->state + model->nq;
     lay_out(c);
     find_fields(c);
+    for (int i = 0; i < model->tasks; i++)
+        opspace_note_acceleration(c, i);
     opspace_pack_places(c);
     return c;
 }
@@ -105,7 +140,7 @@ opspace *opspace_open(const opspace_model *model)
 void opspace_close(opspace *c)
 {
     if (c) {
-        free(c->words);
+        give_memory_back(c->model, c->words);
         free(c->paper);
         free(c->state);
         free(c->place);
@@ -113,6 +148,7 @@ void opspace_close(opspace *c)
         free(c->change);
         free(c->footing);
         free(c->touching);
+        free(c->sums.ahead);
         free(c->fall.last);
     }
     free(c);
@@ -214,15 +250,16 @@ static int normalise(const opspace *c, double *q)
     return 1;
 }
 
-static int64_t answered(opspace *c, double t, int64_t answer, double *tau)
+static int64_t answered(opspace *c, double t, int64_t found, int64_t answer, double *tau)
 {
     const opspace_model *m = c->model;
     if (answer < 0) {
         brake(c, tau);
         without_gravity(c, tau);
-        return OPSPACE_FAULT;
+        return found | OPSPACE_FAULT;
     }
-    int64_t status = answer % ANSWER_SOLVE;
+    int64_t status = found | answer % ANSWER_SOLVE;
+    opspace_learn_errors(c, t, status);
     memcpy(tau, c->tau, (size_t)m->n * sizeof *tau);
     without_gravity(c, tau);
     if (m->base > 0) {
@@ -260,8 +297,9 @@ int64_t opspace_step(opspace *c, double t, const double *q, const double *v, dou
     memcpy(c->v, v, (size_t)m->n * sizeof *v);
     if (m->base > 0)
         found |= opspace_touch(c);
+    opspace_push_integrals(c);
     int64_t answer = opspace_tick(t, c->handle);
-    return found | answered(c, t, answer, tau);
+    return answered(c, t, found, answer, tau);
 }
 
 int opspace_find_task(const opspace *c, const char *name)

@@ -63,7 +63,7 @@ typedef struct {
 
 /* An exported controller as data; its source defines one under its own name. */
 typedef struct {
-    const char *stamp; /* of the kernels that it was made for */
+    const char *stamp; /* of the kernels that it was made for, and of this structure */
     int n;             /* joints */
     int nq;            /* coordinates of a configuration */
     int tasks;
@@ -85,18 +85,21 @@ typedef struct {
     int robot_adds;    /* whether the robot adds the torque against gravity */
     int64_t words; /* of its memory */
     int64_t handle;
+    int64_t integrals; /* what integral action remembers; -1 where no task has any */
     int64_t runs; /* pieces of it that are not zero, */
     const opspace_run *run;
     const uint64_t *content; /* what they hold, one after the other, */
     int64_t addresses;
     const int64_t *address; /* and which words hold the place of another one */
+    uint64_t *memory;       /* where kernels of its own have it; NULL is anywhere */
 } opspace_model;
 
 typedef struct opspace opspace;
 
 /* Make a controller that has not ticked yet.
  *
- * NULL where there is no memory, or where the kernels are not those that the model was made for. */
+ * NULL where there is no memory, or where the kernels are not those that the model was made for; with
+ * kernels of its own also as long as there is another one. */
 opspace *opspace_open(const opspace_model *model);
 
 /* Give its memory back; NULL is none. */
@@ -128,7 +131,8 @@ int opspace_set_target(
 
 /* Change the gains of a task: kp in 1/s^2 and kv in 1/s, one for each of its rows.
  *
- * A force task has no kp, and its kv is at least twice its integral gain. Returns 0, OPSPACE_NO_TASK or
+ * A force task has no kp, and its kv is at least twice its integral gain; kp kv of a task with ki stays
+ * above it. Returns 0, OPSPACE_NO_TASK or
  * OPSPACE_REFUSED: a gain is negative or not finite, or is no force task's. */
 int opspace_set_gains(opspace *controller, int task, const double *kp, const double *kv);
 

@@ -95,6 +95,12 @@ struct opspace {
         double *last; /* torque of the last step in which it stood */
     } fall;
     struct {
+        double *ki, *motion, *joint, *since;
+        double *ahead; /* accelerations without them: 6 of each task, then those of joints */
+        double before;
+        int begun;
+    } sums;
+    struct {
         int64_t *count, *rows, *place, *edges;
         double *numbers, *motion, *force, *most, *cone, *metric, *reference, *hindrance;
     } stance;
@@ -116,6 +122,13 @@ int opspace_arrived(const double *ramp, double t);
 double opspace_activation(const double *ramp, double t);
 void opspace_rest(double *ramp, double profile, double target);
 void opspace_send(double *ramp, double target, double t, double duration);
+
+/* opspace_integrals.c: what is left of errors. */
+int opspace_make_integrals(opspace *c);
+void opspace_note_acceleration(opspace *c, int task);
+void opspace_push_integrals(opspace *c);
+void opspace_learn_errors(opspace *c, double t, int64_t status);
+void opspace_begin_integral(opspace *c, int task, double t);
 
 /* opspace_places.c: at which level tasks are. */
 int opspace_make_places(opspace *c);

@@ -36,8 +36,10 @@ static void start(opspace *c, const wish *one, double t)
         opspace_let_move(c, one->about, (int)x[0], t, x[2]);
     else if (one->what == SWAP_LETTER)
         opspace_let_swap(c, one->about, (int)x[0], t, x[2]);
-    else
+    else {
+        opspace_begin_integral(c, one->about, t);
         opspace_send(c->variable + one->about * VARIABLE_SIZE, x[0], t, x[2]);
+    }
 }
 
 /* What was to start until the step before starts with this one: an earlier start would be a step. */

@@ -184,6 +184,9 @@ int opspace_set_gains(opspace *c, int task, const double *kp, const double *kv)
         if (row && (kp[i] != 0.0 || !(row[PRESS_KI] <= 0.5 * kv[i] * (1.0 + row[PRESS_KP]))))
             return OPSPACE_REFUSED;
     for (int i = 0; i < one->rows; i++)
+        if (c->sums.ki && c->sums.ki[task] > 0.0 && !(c->sums.ki[task] < kp[i] * kv[i]))
+            return OPSPACE_REFUSED;
+    for (int i = 0; i < one->rows; i++)
         if (!isfinite(kp[i]) || !isfinite(kv[i]) || kp[i] < 0.0 || kv[i] < 0.0)
             return OPSPACE_REFUSED;
     unsigned number;
@@ -285,6 +288,7 @@ static void open_letter(opspace *c, const letter *one)
     switch (one->what) {
     case TARGET_LETTER:
         go_to(c, one->about, x);
+        opspace_note_acceleration(c, one->about);
         break;
     case GAINS_LETTER:
         opspace_copy(c->kp + task->first_row, x, task->rows);

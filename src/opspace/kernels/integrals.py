@@ -1,12 +1,8 @@
-"""Integral action of one robot of a fleet, as `opspace.controller.integral`, in kernels' language."""
+"""Integral action of tasks, as `opspace.controller.integral`."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from typing import Any
-
 from opspace.command import Status
-from opspace.controller.disturbance import LONGEST
 from opspace.kernels.algebra import singular_values
 from opspace.kernels.columns import (
     FIRST_ROW,
@@ -26,62 +22,68 @@ from opspace.kernels.columns import (
     SINGULAR,
     SPEED_LIMITED,
     TOOL_AXES,
-    slot_bit,
 )
 from opspace.kernels.compiled_scalars import fade
 from opspace.kernels.motion import measure, selected
+from opspace.kernels.walk import slot_bit
+from opspace.law.scalars import LONGEST_LESSON
+from opspace.machine.jit import jit
 
 LEARNS = int(Status.OK | Status.DIRECTION_OFF | Status.LATE)
 """With anything else in its status a robot has not done what was asked, which teaches nothing."""
 DIRECTION_OFF = int(Status.DIRECTION_OFF)
 
 
-def forget_sum(work, robot, i):
+@jit
+def forget_sum(work, sums, i):
     """Begin anew with task i."""
     for c in range(6):
-        robot.integral[i, c] = 0.0
+        sums.integral[i, c] = 0.0
     for row in range(work.kind[i, FIRST_ROW], work.kind[i, FIRST_ROW] + work.kind[i, ROWS]):
-        robot.joint_integral[row] = 0.0
+        sums.joint_integral[row] = 0.0
 
 
-def push(work, robot):
+@jit
+def push(work, sums):
     """Add the integrals to what tasks are told to accelerate."""
     for i in range(work.kind.shape[0]):
-        if robot.ki[i] == 0.0:
+        if sums.ki[i] == 0.0:
             continue
         first, rows = work.kind[i, FIRST_ROW], work.kind[i, ROWS]
         if work.kind[i, KIND] == MOTION:
             for c in range(6):
-                work.numbers[i, GOAL_ACCELERATION + c] += robot.integral[i, c]
+                work.numbers[i, GOAL_ACCELERATION + c] += sums.integral[i, c]
         elif work.kind[i, KIND] == JOINTS:
             for row in range(first, first + rows):
-                work.goal[row, 2] += robot.joint_integral[row]
+                work.goal[row, 2] += sums.joint_integral[row]
 
 
-def learn(work, robot, status):
+@jit
+def learn(work, sums, status):
     """Add the errors of a tick, as far as the robot could do something about them.
 
     Args:
         work: `opspace.plan.records.TICK` after a tick.
-        robot: `opspace.fleet.robot_record.ROBOT`.
+        sums: `opspace.plan.integral_records.INTEGRALS`, or a record that has its fields.
         status: What happened, in the numbers of `opspace.Status`.
     """
-    if not 0.0 < robot.since[0] <= LONGEST or status | LEARNS != LEARNS:
+    if not 0.0 < sums.since[0] <= LONGEST_LESSON or status | LEARNS != LEARNS:
         return
     for i in range(work.kind.shape[0]):
-        if robot.ki[i] == 0.0 or work.h[i] < 1.0 or _asks_too_much(work, i):
+        if sums.ki[i] == 0.0 or work.h[i] < 1.0 or _asks_too_much(work, i):
             continue
         s = _only_place(work, i)
-        if s < 0 or not _choose(work, robot, i, s, status):
+        if s < 0 or not _choose(work, sums, i, s, status):
             continue
         if work.kind[i, KIND] == JOINTS:
-            _add_joints(work, robot, i)
+            _add_joints(work, sums, i)
         else:
             if work.kind[i, TOOL_AXES] != 0:
                 measure(work, i)
-            _add_motion(work, robot, i)
+            _add_motion(work, sums, i)
 
 
+@jit
 def _asks_too_much(work, i):
     """Whether an error asks for more than its speed, as in `opspace.kernels.task_rows`."""
     if work.kind[i, SPEED_LIMITED] == 0:
@@ -102,6 +104,7 @@ def _asks_too_much(work, i):
     return False
 
 
+@jit
 def _only_place(work, i):
     """Slot of the only level where task i is, −1 for none or several."""
     found = -1
@@ -115,7 +118,8 @@ def _only_place(work, i):
     return found
 
 
-def _choose(work, robot, i, s, status):
+@jit
+def _choose(work, sums, i, s, status):
     """Take the errors of task i, in the directions that are on.
 
     Returns:
@@ -136,20 +140,21 @@ def _choose(work, robot, i, s, status):
     solved = space.top[depth] > 0.0
     if status & DIRECTION_OFF == 0 and depth == highest and (before >= 0 or not solved):
         for row in range(first, first + rows):
-            robot.learned[row] = work.error[row]
+            sums.learned[row] = work.error[row]
         return True
     if before < 0 or not solved or space.width[depth] == 0:
         return False
-    _project(work, robot, i, depth, count, before)
+    _project(work, sums, i, depth, count, before)
     return True
 
 
-def _project(work, robot, i, depth, m, before):
+@jit
+def _project(work, sums, i, depth, m, before):
     """Take what directions that are on have of the errors of task i.
 
     Args:
         work: `opspace.plan.records.TICK`.
-        robot: `opspace.fleet.robot_record.ROBOT`.
+        sums: `opspace.plan.integral_records.INTEGRALS`, or a record that has its fields.
         i: Number of the task.
         depth: Its level.
         m: Rows of the level.
@@ -169,7 +174,7 @@ def _project(work, robot, i, depth, m, before):
     singular_values(C, k, max(m, free), Y, sigma)
     first, rows = work.kind[i, FIRST_ROW], work.kind[i, ROWS]
     for r in range(rows):
-        robot.learned[first + r] = 0.0
+        sums.learned[first + r] = 0.0
     for j in range(k):
         if sigma[j] == 0.0:
             continue
@@ -187,49 +192,31 @@ def _project(work, robot, i, depth, m, before):
             along += entry * work.row_weight[first + r] * work.error[first + r]
         for r in range(rows):
             entry = Y[j, before + r] if wide else C[j, before + r] / sigma[j]
-            robot.learned[first + r] += entry * along / work.row_weight[first + r]
+            sums.learned[first + r] += entry * along / work.row_weight[first + r]
 
 
-def _add_joints(work, robot, i):
+@jit
+def _add_joints(work, sums, i):
     """Add to the integrals of a task of joints: z ← clip(z + k_i Δt e, ± k_p e_max)."""
     first, rows = work.kind[i, FIRST_ROW], work.kind[i, ROWS]
-    gain = robot.ki[i] * robot.since[0]
+    gain = sums.ki[i] * sums.since[0]
     for row in range(first, first + rows):
-        most = robot.max_integral[i] * work.kp[row]
-        moved = robot.joint_integral[row] + gain * robot.learned[row]
-        robot.joint_integral[row] = min(max(moved, -most), most)
+        most = sums.max_integral[i] * work.kp[row]
+        moved = sums.joint_integral[row] + gain * sums.learned[row]
+        sums.joint_integral[row] = min(max(moved, -most), most)
 
 
-def _add_motion(work, robot, i):
+@jit
+def _add_motion(work, sums, i):
     """Add to those of a task of motion, in the coordinates of that."""
     first, rows = work.kind[i, FIRST_ROW], work.kind[i, ROWS]
-    gain, size = robot.ki[i] * robot.since[0], 3
+    gain, size = sums.ki[i] * sums.since[0], 3
     if work.kind[i, QUANTITY] == POSE:
         size = 6
     for c in range(size):
-        moved, most = robot.integral[i, c], 0.0
+        moved, most = sums.integral[i, c], 0.0
         for row in range(first, first + rows):
             factor = selected(work, i, row, c)
-            moved += gain * factor * robot.learned[row]
-            most += abs(factor) * robot.max_integral[i] * work.kp[row]
-        robot.integral[i, c] = min(max(moved, -most), most)
-
-
-def forget_nothing(work, robot, i):
-    """Have no integral."""
-
-
-def push_nothing(work, robot):
-    """Have no integral."""
-
-
-def learn_nothing(work, robot, status):
-    """Have no integral."""
-
-
-WITHOUT: Mapping[Callable[..., Any], Callable[..., Any]] = {
-    forget_sum: forget_nothing,
-    push: push_nothing,
-    learn: learn_nothing,
-}
-"""What is called where no task has a ki, by what is called otherwise."""
+            moved += gain * factor * sums.learned[row]
+            most += abs(factor) * sums.max_integral[i] * work.kp[row]
+        sums.integral[i, c] = min(max(moved, -most), most)
