@@ -676,12 +676,10 @@ def level_weight(below: float) -> float:
     return min(LEVEL_RATIO**below, MOST_WEIGHT)
 
 
-NEAR = 0.3
-"""How far from its target a task in metres is anything but at rest there, m."""
-NEAR_TURN = 1.0
-"""The same of a task in radians."""
+TURN_PER_METRE = 1.0 / 0.3
+"""A task in radians is as near its target with so many times the error of one in metres, rad/m."""
 HURRY = 1.0 / 3.0
-"""A task that would be `NEAR` its target after 1/HURRY seconds moves fast, 1/s."""
+"""What goes from anything but rest to its target in 1/HURRY seconds moves fast, 1/s."""
 REST_LOWER, REST_RELEASE, REST_UPPER = 0.2, 0.6, 1.0
 """Edges of the buffers at rest, as multiples of the lower edge of those in motion."""
 LEFT = 0.5

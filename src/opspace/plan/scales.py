@@ -10,7 +10,7 @@ import numpy as np
 
 from opspace.errors import InputError, unknown_name
 from opspace.law import SigmaBuffer
-from opspace.law.scalars import NEAR, NEAR_TURN
+from opspace.law.scalars import TURN_PER_METRE
 from opspace.plan.calibration import Calibration, Workspace
 from opspace.robots.protocol import Robot
 from opspace.tasks import ForceTask, JointTask, PostureTask, Task
@@ -30,11 +30,12 @@ class Singularity:
     a narrower release fewer reachable targets rest with an error, and an arm that has been stretched
     out comes back later, perhaps not at all.
 
-    A task that rests at its target inside the release would keep an error there, since the levels below
-    pull at it. So where a level is nearly at rest at its targets both buffers lie below: 0.01 to 0.05
-    and 0.01 to 0.03 with the defaults. What is asked for there is small, and so are torques. A level is
-    the nearer to rest the smaller its errors are and the slower the robot is as a whole, see
-    `opspace.law.scalars.unrest_of`; what moves or is far away has the buffers above.
+    A task that rests at its target inside the release keeps an error there, since the levels below pull
+    at it. With ``near`` both buffers lie lower where a level is nearly at rest at its targets: 0.01 to
+    0.05 and 0.01 to 0.03 with the defaults. A level is the nearer to rest the smaller its errors are and
+    the slower the robot is as a whole, see `opspace.law.scalars.unrest_of`; what moves or is far away
+    has the buffers above. For targets that can be reached: a robot that stops on its way to one that
+    cannot is taken for one at rest, and its torque moves steeply.
 
     Args:
         lower: σ at and below which a direction is absent.
@@ -46,8 +47,7 @@ class Singularity:
             fade, and a task that rests inside it keeps an error.
         damping: Of the joint motion along a direction that answers in part, 1/s; none with release 1.
         near: How far from its target a task in metres is anything but at rest there, m; one in radians
-            is at 1 rad for each 0.3 m of it. 0 has the same buffers at rest as in motion. None is 0.3,
-            and 0 with release 1 or absolute eigenvalues, as in the paper.
+            is at 1 rad for each 0.3 m of it. 0 has the same buffers at rest as in motion.
 
     Raises:
         InputError: Not 0 < lower < upper, not 0 < release <= 1, a damping or ``near`` below 0, or a
@@ -61,30 +61,25 @@ class Singularity:
     profile: str = "quintic"
     release: float = 0.4
     damping: float = field(default=10.0, repr=False)
-    near: float | None = field(default=None, repr=False)
+    near: float = 0.0
 
     def __post_init__(self) -> None:
         if self.scale not in ("relative", "absolute"):
             raise unknown_name("scale", self.scale, ("relative", "absolute"))
         if not 0.0 < self.release <= 1.0:
             raise InputError(f"release is a part of the buffer, 0 to 1, got {self.release}")
-        if self.near is not None and not 0.0 <= self.near < float("inf"):
+        if not 0.0 <= self.near < float("inf"):
             raise InputError(f"near is a distance, 0 for none, got {self.near}")
-        if self.near and not self._can_rest:
+        if self.near > 0.0 and (self.release == 1.0 or self.scale != "relative"):
             raise InputError(
                 "near takes two buffers of relative eigenvalues: release below 1, scale 'relative'"
             )
         _ = self.buffer
 
     @property
-    def _can_rest(self) -> bool:
-        return self.release < 1.0 and self.scale == "relative"
-
-    @property
     def rests_within(self) -> tuple[float, float]:
         """How near its target a task is at rest, m and rad; 0 where buffers are the same at rest."""
-        near = self.near if self.near is not None else NEAR if self._can_rest else 0.0
-        return near, NEAR_TURN * near / NEAR
+        return self.near, TURN_PER_METRE * self.near
 
     @property
     def buffer(self) -> SigmaBuffer:
