@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from opspace.command import Command, LevelStatus, TaskStatus
 from opspace.contacts import GroundContact
@@ -30,8 +31,8 @@ from opspace.tasks import Task
 State = Callable[[], tuple[np.ndarray, np.ndarray]]
 """Tells a configuration (nq,) and a velocity (n,)."""
 
-_NOTHING = np.zeros(0)
-_NOWHERE = np.full(6, np.nan)
+NOT_RECORDED = 0, 0
+"""Place and size of a task or level that has no columns."""
 _TWIST = {
     **{axis: f"linear part along {axis}" for axis in "xyz"},
     **{f"r{axis}": f"angular part about {axis}" for axis in "xyz"},
@@ -174,7 +175,7 @@ class TickRecorder:
                 raise InputError(f"two tasks to record are named {name!r}")
         levels = stack.levels_by_number if levels is None else levels
         self._tasks = {task.name: task for task in [*stack, *tasks]}
-        self._levels = {number: _directions(controller, level) for number, level in levels.items()}
+        sizes = {number: _directions(controller, level) for number, level in levels.items()}
         self._sensors = sensors_of(list(self._tasks.values()))
         self._truth = truth
         guard = controller.collisions
@@ -187,24 +188,66 @@ class TickRecorder:
             columns += _truth_columns(controller)
         about = {**subject_of(controller, tasks, touching), **header}
         self._recorder = Recorder(directory, columns, about, overwrite=overwrite)
+        self._row = np.full(len(columns), np.nan)
+        self._known = controller.robot.nq + 2 * controller.robot.nv + 4
+        place = self._known
+        self._task_places: dict[str, tuple[int, int]] = {}
+        for name, task in self._tasks.items():
+            self._task_places[name] = place, task.rows
+            place += 2 + task.rows
+        self._level_places: dict[float, tuple[int, int]] = {}
+        for number, size in sizes.items():
+            self._level_places[number] = place, size
+            place += 2 * size + len(_TWIST)
+        self._rest = place
 
     def observe(self, q: np.ndarray, v: np.ndarray, command: Command) -> None:
         """Write one tick."""
+        controller, row = self._controller, self._row
+        row.fill(np.nan)
+        state = [command.t], q, v, command.tau, controller.robot.position(self._tool)
+        np.concatenate(state, out=row[: self._known])
+        self._put_tasks(command.tasks)
+        self._put_levels(command.levels)
+        np.concatenate(self._others(command), out=row[self._rest :])
+        self._recorder.append(row)
+
+    def _put_tasks(self, tasks: Mapping[str, TaskStatus]) -> None:
+        row = self._row
+        for name, found in tasks.items():
+            place, rows = self._task_places.get(name, NOT_RECORDED)
+            if rows:
+                row[place], row[place + 1] = found.activation, _level(found)
+                row[place + 2 : place + 2 + rows] = found.error
+
+    def _put_levels(self, levels: Sequence[LevelStatus]) -> None:
+        row = self._row
+        for level in levels:
+            place, size = self._level_places.get(level.level, NOT_RECORDED)
+            known = min(size, level.sigma.size)
+            if known:
+                row[place : place + known] = level.sigma[:known]
+                place += size
+                row[place : place + known] = level.activation[:known]
+                self._put_weakest(level, row[place + size : place + size + len(_TWIST)])
+
+    def _put_weakest(self, level: LevelStatus, into: np.ndarray) -> None:
+        """Put the direction that a level would lose first, as a motion in the world, (6,)."""
+        robot, row, weakest = self._controller.robot, 0, np.zeros(len(_TWIST))
+        direction = level.directions[:, int(np.argmin(level.sigma))]
+        for name in level.tasks:
+            task = self._tasks.get(name)
+            axes = None if task is None else task.row_axes(robot)
+            if axes is None:
+                return
+            weakest += direction[row : row + len(axes)] @ axes
+            row += len(axes)
+        into[:] = weakest
+
+    def _others(self, command: Command) -> list[ArrayLike]:
+        """Limits, distances, contacts, wrenches, and how the tick ended, as their columns stand."""
         controller = self._controller
-        parts = [[command.t], q, v, command.tau, controller.robot.position(self._tool)]
-        found_tasks = command.tasks
-        for name, task in self._tasks.items():
-            found, rows = found_tasks.get(name), task.rows
-            if found is None:
-                parts += [[np.nan, np.nan], _padded(_NOTHING, rows)]
-            else:
-                parts += [[found.activation, _level(found)], _padded(found.error, rows)]
-        levels = {level.level: level for level in command.levels}
-        for number, size in self._levels.items():
-            level = levels.get(number)
-            sigma, h = (_NOTHING, _NOTHING) if level is None else (level.sigma, level.activation)
-            weakest = _NOWHERE if level is None else self._weakest(level)
-            parts += [_padded(sigma, size), _padded(h, size), weakest]
+        parts: list[ArrayLike] = []
         if controller.stack.limits is not None:
             # Worked out anew each time it is asked for.
             limits = command.limits
@@ -220,18 +263,7 @@ class TickRecorder:
         parts.append([float(command.hard_solves), float(command.status)])
         if self._truth is not None:
             parts += self._truth()
-        self._recorder.append(np.concatenate(parts))
-
-    def _weakest(self, level: LevelStatus) -> np.ndarray:
-        """Return the direction that a level would lose first, as a motion in the world, (6,)."""
-        if not level.sigma.size or not all(name in self._tasks for name in level.tasks):
-            return _NOWHERE
-        robot = self._controller.robot
-        axes = [self._tasks[name].row_axes(robot) for name in level.tasks]
-        known = [rows for rows in axes if rows is not None]
-        if len(known) < len(axes):
-            return _NOWHERE
-        return level.directions[:, int(np.argmin(level.sigma))] @ np.vstack(known)
+        return parts
 
     def close(self, how: Ended = "completed", reason: str = "") -> None:
         """Finish the recording and say how the run ended."""
@@ -260,11 +292,3 @@ def _truth_columns(controller: ReferenceController) -> list[Column]:
 
 def _directions(controller: ReferenceController, level: Sequence[Task]) -> int:
     return min(sum(task.rows for task in level), controller.robot.nv)
-
-
-def _padded(values: np.ndarray, size: int) -> np.ndarray:
-    if values.size == size:
-        return values
-    padded = np.full(size, np.nan)
-    padded[: values.size] = values[:size]
-    return padded
