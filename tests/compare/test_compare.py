@@ -68,7 +68,9 @@ def compared():
 
 
 def test_every_method_is_measured(compared):
-    assert list(compared.rows) == [n for n, method in METHODS.items() if method.installed()]
+    assert list(compared.rows) == [
+        name for name, method in METHODS.items() if method.installed() and method.bolted
+    ]
     for name, row in compared.rows.items():
         assert row.torque_step > 0.0, name
         assert row.tick > 0.0

@@ -13,8 +13,8 @@ WORDS = 8
 PANDA = osc.load_robot("panda")
 
 
-def stack():
-    tool = osc.PoseTask(target=([0.4, 0.2, 0.5], np.eye(3)))
+def stack(ki=0.0):
+    tool = osc.PoseTask(target=([0.4, 0.2, 0.5], np.eye(3)), ki=ki)
     return osc.Stack([tool, osc.PostureTask(PANDA.q_reference)])
 
 
@@ -51,5 +51,8 @@ def test_no_kernel_is_given_memory_that_is_free_again(seen):
     assert driver.step(0.0, q, v).levels[0].sigma.size == 6
     driver.step(0.5, q, v)
     driver.torque_batch(np.stack([q, q]), np.stack([v, v]))
+    learner = osc.Controller(PANDA, stack(ki=10.0))
+    for tick in range(3):
+        learner.step(0.001 * tick, q, v)
     # The record of cycles lasts as long as the loop that goes through them.
     assert seen == {entry.name for entry in ENTRIES} - {"cycles"}

@@ -14,7 +14,7 @@ import numpy as np
 from opspace.bench.scenes import SCENES, Scene
 from opspace.bench.states_per_second import states_per_second
 from opspace.bench.subjects import LIBRARY, MODEL, PLACO, Tick, subjects
-from opspace.bench.timing import Timed, interleaved, pinned, slowest_state
+from opspace.bench.timing import TimesItself, interleaved, pinned, slowest_state
 from opspace.errors import InputError, unknown_name
 
 PACKAGES = ("opspace", "numba", "numpy", "pin", "mujoco", "placo")
@@ -97,7 +97,7 @@ def run_benchmark(
     core: int | None = None,
     *,
     readable: bool = False,
-    more: Callable[[Scene], Mapping[str, Timed]] = lambda _: {},
+    more: Callable[[Scene], Mapping[str, TimesItself]] = lambda _: {},
     announce: Callable[[str], None] = lambda _: None,
 ) -> Benchmark:
     """Time scenes.
@@ -128,7 +128,7 @@ def run_benchmark(
         for name in names or SCENES:
             announce(f"{name}: {SCENES[name].title}")
             scene = SCENES[name]
-            timed: dict[str, Tick | Timed] = {**subjects(scene, readable), **more(scene)}
+            timed: dict[str, Tick | TimesItself] = {**subjects(scene, readable), **more(scene)}
             q, v = scene.states(scene.robot())
             times = interleaved(timed, q, v, ticks)
             found.scenes[name] = {subject: _summary(x, len(q)) for subject, x in times.items()}

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from opspace.bench.subjects import Tick
 
 
-class Timed(NamedTuple):
+class TimesItself(NamedTuple):
     """A subject that times its ticks itself, outside of Python.
 
     Attributes:
@@ -54,7 +54,7 @@ def pinned(core: int | None) -> Iterator[None]:
 
 
 def interleaved(
-    ticks: Mapping[str, Tick | Timed],
+    ticks: Mapping[str, Tick | TimesItself],
     q: np.ndarray,
     v: np.ndarray,
     count: int,
@@ -73,8 +73,8 @@ def interleaved(
     q, v = np.ascontiguousarray(q), np.ascontiguousarray(v)
     states = list(zip(q, v, strict=True))
 
-    def block(tick: Tick | Timed, into: np.ndarray) -> None:
-        if isinstance(tick, Timed):
+    def block(tick: Tick | TimesItself, into: np.ndarray) -> None:
+        if isinstance(tick, TimesItself):
             tick.block(q, v, into)
         else:
             _block(tick, states, into)

@@ -340,6 +340,8 @@ def whiten_tasks(
 
 def _unrest(near: np.ndarray, error: np.ndarray, speed: float, reference: np.ndarray) -> float:
     """How far a task is from rest at its target, see `opspace.law.scalars.unrest_of`."""
+    if not near.any():
+        return 1.0
     rows = zip(near.tolist(), error.tolist(), reference.tolist(), strict=True)
     return math.sqrt(sum(unrest_of(e, x, speed, usual) for e, x, usual in rows))
 

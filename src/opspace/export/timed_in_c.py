@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from opspace.bench.scenes import SCENES, Scene
-from opspace.bench.timing import Timed
+from opspace.bench.timing import TimesItself
 from opspace.errors import InputError, unknown_name
 from opspace.export.c_library import export_c
 
@@ -62,7 +62,7 @@ def check_in_c(names: Iterable[str]) -> None:
             raise unknown_name("scene that is timed in C", name, valid)
 
 
-def timed_in_c(scene: Scene) -> dict[str, Timed]:
+def timed_in_c(scene: Scene) -> dict[str, TimesItself]:
     """Export the controller of a scene and compile it, with the kernels of all and with its own.
 
     Args:
@@ -71,7 +71,7 @@ def timed_in_c(scene: Scene) -> dict[str, Timed]:
     return {name: _built(scene, own) for own, name in NAMES.items()}
 
 
-def _built(scene: Scene, own_kernels: bool) -> Timed:
+def _built(scene: Scene, own_kernels: bool) -> TimesItself:
     controller = scene.controller()
     q, v = scene.states(controller.robot)
     controller.step(0.0, q[0], v[0])
@@ -87,4 +87,4 @@ def _built(scene: Scene, own_kernels: bool) -> Timed:
         arrays = [ctypes.c_void_p(x.ctypes.data) for x in (q, v, durations)]
         library.drive(*arrays[:2], len(q), durations.size, arrays[2])
 
-    return Timed(timed)
+    return TimesItself(timed)
