@@ -13,7 +13,7 @@ WORDS = 8
 PANDA = osc.load_robot("panda")
 
 
-def stack(ki=0.0):
+def stack(ki=None):
     tool = osc.PoseTask(target=([0.4, 0.2, 0.5], np.eye(3)), ki=ki)
     return osc.Stack([tool, osc.PostureTask(PANDA.q_reference)])
 
