@@ -13,8 +13,8 @@ WORDS = 8
 PANDA = osc.load_robot("panda")
 
 
-def stack(ki=None):
-    tool = osc.PoseTask(target=([0.4, 0.2, 0.5], np.eye(3)), ki=ki)
+def stack():
+    tool = osc.PoseTask(target=([0.4, 0.2, 0.5], np.eye(3)))
     return osc.Stack([tool, osc.PostureTask(PANDA.q_reference)])
 
 
@@ -51,7 +51,7 @@ def test_no_kernel_is_given_memory_that_is_free_again(seen):
     assert driver.step(0.0, q, v).levels[0].sigma.size == 6
     driver.step(0.5, q, v)
     driver.torque_batch(np.stack([q, q]), np.stack([v, v]))
-    learner = osc.Controller(PANDA, stack(ki=10.0))
+    learner = osc.Controller(PANDA, osc.Stack([osc.PoseTask(ki=10.0), osc.PostureTask()]))
     for tick in range(3):
         learner.step(0.001 * tick, q, v)
     # The record of cycles lasts as long as the loop that goes through them.
