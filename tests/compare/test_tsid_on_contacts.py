@@ -12,6 +12,7 @@ from opspace.compare.humanoid import VARIANTS, usable_variants
 from opspace.compare.methods import usable_methods
 from opspace.compare.tsid_model import tsid_installed
 from opspace.errors import InputError
+from opspace.plots.contact_figure import COLORS, TITLES
 from opspace.scenario import load_scenario
 from opspace.scenario.build import build
 from opspace.tasks.rotation import skew
@@ -37,6 +38,19 @@ def test_it_is_left_out_and_refused_with_what_to_install(monkeypatch):
     assert VARIANTS["tsid"].needs.startswith("pip install tsid==")
     with pytest.raises(InputError, match="needs TSID's Python package: pip install tsid=="):
         steps(standing(), [0.0])
+
+
+def test_a_folder_of_its_name_is_not_the_package(monkeypatch, tmp_path):
+    before = tsid_installed()
+    (tmp_path / "tsid").mkdir()
+    monkeypatch.syspath_prepend(tmp_path)
+    assert importlib.util.find_spec("tsid") is not None
+    assert tsid_installed() == before
+
+
+def test_every_variant_can_be_drawn():
+    assert set(VARIANTS) == set(COLORS) == set(TITLES)
+    assert len(set(COLORS.values())) == len(COLORS)
 
 
 def test_a_package_that_does_not_import_is_told(monkeypatch):
@@ -93,7 +107,9 @@ def test_without_limits_it_finds_the_least_of_the_weighted_squares(seed, monkeyp
     held = [contact.evaluate(robot) for contact in feet.values()]
     for terms in held:
         np.testing.assert_allclose(terms.J @ found, terms.acceleration, atol=1e-6)
-    asked = [(m.level, m.task.evaluate(robot, 0.001)) for m in built.controller.stack.begin_tick(0.001)]
+    asked = [
+        (m.level, m.task.evaluate(robot, 0.001)) for m in built.controller.stack.begin_tick(0.001)
+    ]
     weights = [max(10.0**-level, 1e-3) for level, _ in asked]
     best = weighted([terms for _, terms in asked], weights, held)
     np.testing.assert_allclose(found, best, atol=1e-3)
@@ -139,8 +155,14 @@ def test_the_largest_force_of_a_contact_that_goes_is_lowered_over_the_duration()
     ("change", "named"),
     [
         (lambda stack: stack.insert(PositionTask(HAND, ki=1.0, name="sum"), level=4), "'sum'"),
-        (lambda stack: stack.insert(PositionTask(HAND, max_speed=1.0, name="slow"), level=4), "'slow'"),
-        (lambda stack: stack.insert(PointContact(HAND, offset=(0.1, 0.0, 0.0), name="tip")), "'tip'"),
+        (
+            lambda stack: stack.insert(PositionTask(HAND, max_speed=1.0, name="slow"), level=4),
+            "'slow'",
+        ),
+        (
+            lambda stack: stack.insert(PointContact(HAND, offset=(0.1, 0.0, 0.0), name="tip")),
+            "'tip'",
+        ),
         (lambda stack: stack.insert(EdgeContact(HAND, half=0.1, name="rail")), "'rail'"),
     ],
 )

@@ -24,14 +24,16 @@ from opspace.tasks.posture import PostureTask
 from opspace.tasks.quantities import Orientation, Pose
 from opspace.tasks.rotation import matrix_from_quaternion
 
-PACKAGE = "tsid"
+PACKAGE, COMPILED = "tsid", "tsid_pywrap"
 INSTALLS_TSID = "pip install tsid==1.7.1 pin==3.4.0 'cmeel-urdfdom<5' 'cmeel-tinyxml2<11'"
 """What installs a release that has been tried, in an environment of its own."""
 
 
 def tsid_installed() -> bool:
-    """Tell whether the package can be found."""
-    return importlib.util.find_spec(PACKAGE) is not None
+    """Tell whether the package can be found; a folder that has its name is not it."""
+    spec = importlib.util.find_spec(PACKAGE)
+    places = [] if spec is None else spec.submodule_search_locations or []
+    return any(any(Path(place).glob(f"{COMPILED}*")) for place in places)
 
 
 def tsid_module() -> Any:
@@ -45,7 +47,7 @@ def tsid_module() -> Any:
         raise InputError(needs)
     try:
         importlib.import_module("pinocchio")  # whose types TSID's functions take
-        return importlib.import_module(f"{PACKAGE}.tsid_pywrap")
+        return importlib.import_module(f"{PACKAGE}.{COMPILED}")
     except ImportError as error:
         raise InputError(f"{needs}; the one that is there does not import: {error}") from error
 
@@ -71,7 +73,7 @@ class TsidModel:
         assert joints == list(robot.joint_names[self.base :])
 
     def state(self, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Write a state as TSID has it: quaternions end with w, the base's velocity is in its own axes."""
+        """Write a state as TSID has it: quaternions end with w, the base moves in its own axes."""
         if not self.base:
             return q, v
         turned = matrix_from_quaternion(tuple(q[3:7].tolist()))

@@ -66,10 +66,11 @@ class StandingProgram:
         self._tasks: dict[str, float] = {}
         self._references: dict[str, Any] = {}
         self._contacts: dict[str, _Held] = {}
+        # TSID refers to them and does not own them, to a contact until its ramp is over.
         self._kept: list[Any] = []
         if controller.torque_limits == "priority":
             motors = motor_range(robot)
-            bounds = tsid.TaskActuationBounds("motors", model.wrapper)
+            bounds = tsid.TaskActuationBounds("limits: motors", model.wrapper)
             bounds.setBounds(motors.least[6:], motors.most[6:])
             self._formulation.addActuationTask(bounds, 1.0, HARD, 0.0)
             self._kept.append(bounds)
@@ -167,7 +168,9 @@ class StandingProgram:
         tsid, wrapper = self._model.tsid, self._model.wrapper
         frame, most = contact.frame, contact.max_force
         if contact.activation is not None:
-            raise InputError(f"the method tsid has no activation of contacts, as {contact.name!r} has")
+            raise InputError(
+                f"the method tsid has no activation of contacts, as {contact.name!r} has"
+            )
         if isinstance(contact, SoleContact) and contact.force is None:
             x, y = contact.half
             corners = np.array([[x, x, -x, -x], [y, -y, y, -y], [0.0] * 4])
@@ -215,7 +218,7 @@ class StandingProgram:
             (lower if side.sign < 0.0 else upper)[k] = side.limit
             speed[k], most[k] = side.speed, side.brake
         bounds = self._model.tsid.TaskJointPosVelAccBounds(
-            "joints", self._model.wrapper, period or TICK, False
+            "limits: joints", self._model.wrapper, period or TICK, False
         )
         bounds.setPositionBounds(lower, upper)
         bounds.setVelocityBounds(speed)
@@ -223,4 +226,3 @@ class StandingProgram:
         bounds.setImposeBounds(True, True, True, False)
         self._formulation.addMotionTask(bounds, 1.0, HARD, 0.0)
         return bounds
-
