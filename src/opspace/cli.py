@@ -312,7 +312,7 @@ def _reproduce_humanoid(robot: str | None, out: Path) -> None:
         print(f"{name}: {VARIANTS[name].title}{ended}")
     for name, variant in VARIANTS.items():
         if name not in runs:
-            print(f"{name} is left out: {variant.needs} is not installed", file=sys.stderr)
+            print(f"{name} is left out, it needs: {variant.needs}", file=sys.stderr)
     with counter("film.gif") as pictures:
         for problem in draw(runs, out, progress=pictures):
             print(problem, file=sys.stderr)

@@ -10,7 +10,7 @@ from opspace.cli import main
 from opspace.compare import METHODS, compare_scenario
 from opspace.compare.laws import continuous_inverse, damped_inverse, stack_of_tasks
 from opspace.compare.methods import usable_methods
-from opspace.compare.tsid_controller import tsid_installed
+from opspace.compare.tsid_model import tsid_installed
 from opspace.errors import InputError, UnknownNameError
 from opspace.law import TaskSet, task_torque
 from opspace.scenario import dump_scenario, load_scenario
@@ -21,6 +21,8 @@ TASKS = {
     "elbow": {"type": "joint", "joint": "joint3", "level": 1, "kp": 50.0, "target": -2.5},
 }
 ONE = [{"at": 0.01, "insert": "elbow", "level": -1, "duration": 0.03, "profile": "linear"}]
+FOR_THE_PUMA = [n for n, m in METHODS.items() if m.installed() and m.bolted and n != "tsid"]
+"""TSID takes robots from a URDF only."""
 BOTH = [
     {"at": 0.02, "insert": "elbow", "level": -1, "duration": 0.1},
     {"at": 0.08, "swap": ["orientation", "position"], "duration": 0.1},
@@ -64,13 +66,12 @@ def test_cross_fades_that_overlap_are_continuous_and_end_where_they_should():
 
 @pytest.fixture(scope="module")
 def compared():
-    return compare_scenario(short(tasks=TASKS, events=BOTH, duration=0.25))
+    return compare_scenario(short(tasks=TASKS, events=BOTH, duration=0.25), FOR_THE_PUMA)
 
 
 def test_every_method_is_measured(compared):
-    assert list(compared.rows) == [
-        name for name, method in METHODS.items() if method.installed() and method.bolted
-    ]
+    assert list(compared.rows) == FOR_THE_PUMA
+    assert set(usable_methods(short())) - {"tsid"} == set(FOR_THE_PUMA)
     for name, row in compared.rows.items():
         assert row.torque_step > 0.0, name
         assert row.tick > 0.0
@@ -141,7 +142,7 @@ def test_the_command_writes_table_figure_and_numbers(tmp_path, capsys):
 
 
 def test_tsid_is_left_out_where_it_is_not_installed(monkeypatch):
-    monkeypatch.setattr("opspace.compare.tsid_controller.tsid_installed", lambda: False)
+    monkeypatch.setattr("opspace.compare.tsid_model.tsid_installed", lambda: False)
     assert "tsid" in METHODS
     built = build(short(), METHODS["tsid"].controller)
     with pytest.raises(InputError, match="needs TSID's Python package"):
@@ -151,7 +152,10 @@ def test_tsid_is_left_out_where_it_is_not_installed(monkeypatch):
 @pytest.mark.skipif(not tsid_installed(), reason="needs TSID's Python package")
 def test_tsid_asks_for_the_same_accelerations():
     """Without conflict and with one task in each level a weighted program is nearly a hierarchy."""
-    scenario = short(robot="panda", tasks={"position": HOLD["tasks"]["position"]})
+    bent = [0.0, -0.4, 0.0, -2.0, 0.0, 1.6, 0.8]
+    posture = {"type": "posture", "level": 2, "kp": 25.0}
+    tasks = {"position": HOLD["tasks"]["position"], "posture": posture}
+    scenario = short(robot="panda", start=bent, tasks=tasks)
     found = torques(scenario, "tsid", 3)
     np.testing.assert_allclose(found[:, 1], found[:, 0], rtol=0, atol=0.5)
 
@@ -166,14 +170,7 @@ def test_a_robot_that_stands_is_measured_with_the_forces_of_its_contacts():
     assert 1e-6 < weighted.leak < 1.0
     assert ours.overshoot == 0.0
     assert {"opspace", "soft-weights"} <= set(usable_methods(scenario))
-    assert not {"cbf-qp", "tsid"} & set(usable_methods(scenario))
+    assert "cbf-qp" not in usable_methods(scenario)
     assert "cbf-qp" in usable_methods(short())
     with pytest.raises(InputError, match="knows no contacts"):
         compare_scenario(scenario, ["cbf-qp"])
-
-
-def test_tsid_refuses_a_robot_that_stands_by_name():
-    standing = build(load_scenario("humanoid"), METHODS["tsid"].controller)
-    assert "tsid" not in usable_methods(load_scenario("humanoid"))
-    with pytest.raises(InputError, match="tsid knows no contacts, and robot 'g1'"):
-        standing.controller.step(0.0, standing.plant.q, standing.plant.v)

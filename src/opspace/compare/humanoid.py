@@ -11,8 +11,15 @@ from typing import Any
 
 import numpy as np
 
-from opspace.compare.laws import REGULARISATION, presences, weighted_least_squares
+from opspace.compare.laws import (
+    REGULARISATION,
+    presences,
+    ten_to_one_weight,
+    weighted_least_squares,
+)
 from opspace.compare.strict_program import StrictProgramController, daqp_installed
+from opspace.compare.tsid_controller import TsidController
+from opspace.compare.tsid_model import INSTALLS_TSID, tsid_installed
 from opspace.controller import Controller, ReferenceController
 from opspace.controller.stages import Question
 from opspace.law import LawInfo
@@ -37,8 +44,6 @@ SETTLED = 0.05
 """Time after a touchdown in which planned and measured forces are not compared, s."""
 FIRMEST = 1e8
 """Weight of contacts in the weighted program."""
-FAINTEST = 1e-3
-"""Smallest weight of a level in the weighted program."""
 
 CHANGES: Mapping[str, tuple[str, int]] = MappingProxyType(
     {
@@ -64,13 +69,16 @@ def ten_to_one(asked: Question) -> tuple[np.ndarray, LawInfo]:
     def weight(rank: int) -> float:
         if rank >= len(asked.levels):
             return REGULARISATION
-        return FIRMEST if rank < 0 else max(10.0 ** -asked.levels[rank], FAINTEST)
+        return FIRMEST if rank < 0 else ten_to_one_weight(asked.levels[rank])
 
     weights = [
         h * weight(task.priority)
         for h, task in zip(presences(asked.corners, len(sets)), sets, strict=True)
     ]
     return weighted_least_squares(asked.L, sets, weights), LawInfo(1, 1, ())
+
+
+INSTALLS_DAQP = "pip install 'opspace[compare]'"
 
 
 @dataclass(frozen=True)
@@ -81,7 +89,7 @@ class Variant:
         title: What it does.
         changes: What it changes in the scenario.
         controller: Makes the controller.
-        needs: Package that it needs beside the library's own; empty for none.
+        needs: What installs what it needs beside the library; empty for nothing.
         installed: Whether that is there.
     """
 
@@ -110,15 +118,22 @@ VARIANTS: Mapping[str, Variant] = MappingProxyType(
             "strict priorities by one quadratic program per level; the forces of contacts are ramped",
             {},
             StrictProgramController,
-            "daqp",
+            INSTALLS_DAQP,
             daqp_installed,
         ),
         "hierarchy-switch": Variant(
             "the same programs, hard switch",
             {"method": "switch"},
             StrictProgramController,
-            "daqp",
+            INSTALLS_DAQP,
             daqp_installed,
+        ),
+        "tsid": Variant(
+            "TSID: one quadratic program, weights 10 to 1 from level to level, changed as it offers",
+            {},
+            TsidController,
+            INSTALLS_TSID,
+            tsid_installed,
         ),
     }
 )

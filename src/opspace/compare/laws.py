@@ -16,11 +16,19 @@ SOFTNESS = 100.0
 REGULARISATION = 1e-10
 """Weight of ‖û‖² relative to level 0."""
 
+FAINTEST = 1e-3
+"""Smallest weight of a level where the weights are 10 to 1."""
+
 EDGE, LARGEST_DAMPING = 0.6, 0.1
 """Below this σ a level is damped, at σ = 0 by this λ²; multiples of the usual σ."""
 
 Inverse = Callable[[np.ndarray, np.ndarray, float], np.ndarray]
 """(JN (m, n), activation of each row (m,), smallest singular value to count) → inverse (n, m)."""
+
+
+def ten_to_one_weight(level: float) -> float:
+    """Weigh a level by its number, max(10^(−level), `FAINTEST`)."""
+    return max(10.0**-level, FAINTEST)
 
 
 def presences(blend: Sequence[Weighted], count: int) -> list[float]:

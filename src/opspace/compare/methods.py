@@ -13,7 +13,8 @@ from opspace.compare.blendings import CrossFade, Present
 from opspace.compare.laws import continuous_inverse, damped_inverse
 from opspace.compare.projections import BarrierProgram
 from opspace.compare.strict_program import StrictProgramController, daqp_installed
-from opspace.compare.tsid_controller import TsidController, tsid_installed
+from opspace.compare.tsid_controller import TsidController
+from opspace.compare.tsid_model import tsid_installed
 from opspace.controller import Controller, ReferenceController
 from opspace.scenario import Scenario
 from opspace.scenario.build import build_robot
@@ -124,11 +125,11 @@ METHODS: Mapping[str, Method] = MappingProxyType(
             bolted=False,
         ),
         "tsid": Method(
-            "TSID: one quadratic program, 100 to 1 from level to level, weights ramped",
-            "no joint limits; no sigma buffer",
+            "TSID: one quadratic program, 100 to 1 from level to level, weights ramped; on contacts "
+            "10 to 1, changed as TSID offers",
+            "no joint limits for an arm; no sigma buffer",
             TsidController,
             installed=tsid_installed,
-            stands=False,
         ),
     }
 )

@@ -21,6 +21,7 @@ COLORS: Mapping[str, str] = {
     "weighted-switch": style.line_color(3),
     "hierarchy": style.line_color(4),
     "hierarchy-switch": style.line_color(5),
+    "tsid": style.line_color(6),
 }
 TITLES: Mapping[str, str] = {
     "transition": "continuous",
@@ -29,6 +30,7 @@ TITLES: Mapping[str, str] = {
     "weighted-switch": "switched weights",
     "hierarchy": "strict QPs",
     "hierarchy-switch": "switched QPs",
+    "tsid": "TSID",
 }
 LOWEST = 1e-4
 """Where a torque step counts as none, N·m."""
