@@ -33,7 +33,7 @@ class Singularity:
     A task that rests at its target inside the release keeps an error there, since the levels below pull
     at it. With ``near`` both buffers lie lower where a level is nearly at rest at its targets: 0.01 to
     0.05 and 0.01 to 0.03 with the defaults. A level is the nearer to rest the smaller its errors are and
-    the slower the robot is as a whole, see `opspace.law.scalars.unrest_of`; what moves or is far away
+    the slower the robot is as a whole, see `opspace.law.scalars.unrest_of`; what is fast or far away
     has the buffers above. For targets that can be reached: a robot that stops on its way to one that
     cannot is taken for one at rest, and its torque moves steeply.
 
