@@ -250,7 +250,8 @@ def test_far_from_rest_the_buffers_are_those_of_motion(sigma):
     for unrest in (1.0, 3.0):
         assert TWO.response(sigma, unrest) == bare[0].response(sigma)
         assert TWO.activation(sigma, unrest) == bare[1].activation(sigma)
-    assert TWO.response(sigma, 0.0) == (1.0 if sigma >= 0.05 else TWO.response(sigma, 0.0))
+    if sigma >= 0.05:
+        assert TWO.response(sigma, 0.0) == TWO.activation(sigma, 0.0) == 1.0
     one = SigmaBuffer(0.05, 0.7)
     for unrest in (0.0, 0.5, 1.0):  # the paper's form knows no rest
         assert one.response(sigma, unrest) == one.activation(sigma, unrest) == one.response(sigma)

@@ -258,7 +258,7 @@ def damp_rest(work, n):
 
 
 @jit
-def rest_of_rows(work, n):
+def unrest_of_rows(work, n):
     """How far every row is from rest at its target, squared, into space.unrest (rows + limits,)."""
     speed = 0.0
     for a in range(n):
@@ -290,7 +290,7 @@ def law(work, stacks, limit_stacks):
         start_inside(work, n)
     if work.option[SINGULAR] != 0.0:
         whitened_of(work.inertia, work.v, space.motion)
-        rest_of_rows(work, n)
+        unrest_of_rows(work, n)
     for a in range(n):
         work.u[a] = 0.0
     begin(n, levels, space)
