@@ -1,11 +1,19 @@
 """What lower buffers at rest cost where a target lies out of reach: the table of docs/singularities.md.
 
-``python docs/evidence/rest_beyond_reach.py`` (about a minute).
+``python docs/evidence/rest_beyond_reach.py`` (about two minutes) prints it, and what they cost on the
+way to random targets.
 """
 
 from __future__ import annotations
 
-from buffer_motions import Reach, run, tasks
+import tempfile
+from pathlib import Path
+
+import numpy as np
+from buffer_motions import Reach, Watch, run, tasks
+from buffer_targets import ARMS as REACHING
+from buffer_targets import targets
+from seven_joint_arms import load_arm
 
 import opspace as osc
 
@@ -27,12 +35,32 @@ def torque_step(name: str, beyond: float, near: float) -> float:
     ).torque_step
 
 
+def steps_to_targets(robot: osc.Robot, near: float) -> list[float]:
+    """Largest torque step on the way to each of 16 targets within 4 s, N·m per ms."""
+    found = []
+    for position, rotation in targets(robot)[:16]:
+        turn = osc.OrientationTask(target=rotation, max_speed=1.0)
+        hand = osc.PositionTask(target=position, max_speed=0.5)
+        stack = osc.Stack([osc.JointLimits(), turn, hand, osc.PostureTask(robot.q_reference)])
+        controller = osc.Controller(robot, stack, singularity=osc.Singularity(near=near))
+        seen = Watch()
+        osc.simulate(osc.Plant(robot, robot.q_reference), controller, 4.0, [seen])
+        found.append(float(np.abs(np.diff(seen.tau, axis=0)).max()))
+    return found
+
+
 def main() -> None:
     """Measure and print."""
     for beyond in BEYOND:
         steps = [[torque_step(name, beyond, near) for near in (0.0, 0.3)] for name in ARMS]
         cells = [f"{without:.2g} → {lower:.2g}" for without, lower in steps]
         print(f"| {beyond:.2f} | {' | '.join(cells)} |", flush=True)
+    with tempfile.TemporaryDirectory() as folder:
+        for name in REACHING:
+            robot = load_arm(name, Path(folder))
+            for near in (0.0, 0.3):
+                steps = steps_to_targets(robot, near)
+                print(f"{name}, near={near}: median {np.median(steps):.2g}, most {max(steps):.2g}")
 
 
 if __name__ == "__main__":
