@@ -5,7 +5,7 @@ import pytest
 
 import opspace as osc
 from opspace.bench.scenes import SCENES
-from opspace.bench.timing import Timed, interleaved
+from opspace.bench.timing import TimesItself, interleaved
 from opspace.export.timed_in_c import NAMES, check_in_c, timed_in_c
 from tests.export.in_c import with_cc
 
@@ -34,7 +34,7 @@ def test_what_times_itself_takes_its_turns_with_the_states_of_the_others():
         durations[:] = 7.0
 
     q = np.arange(5.0)[:, None]
-    times = interleaved({"python": lambda q, v: None, "c": Timed(block)}, q, q, 700)
+    times = interleaved({"python": lambda q, v: None, "c": TimesItself(block)}, q, q, 700)
     assert [size for _, size in seen] == [500, 500, 200]
     assert all(np.array_equal(given, q) for given, _ in seen)
     np.testing.assert_array_equal(times["c"], 7.0)

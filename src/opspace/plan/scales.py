@@ -61,7 +61,7 @@ class Singularity:
     profile: str = "quintic"
     release: float = 0.4
     damping: float = field(default=10.0, repr=False)
-    near: float = 0.0
+    near: float = field(default=0.0, repr=False)
 
     def __post_init__(self) -> None:
         if self.scale not in ("relative", "absolute"):
