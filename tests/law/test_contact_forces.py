@@ -315,37 +315,51 @@ class Loop(Standing):
     def tasks(self):
         return self.wanted_of_tasks
 
-    def taus(self, points):
-        """Torques at so many points of the loop, and how many of them had something to give up."""
+    def at(self, phase):
+        """What is realised at a place of the loop."""
         M, bias, J = self.rest
-        found = []
-        for phase in 2.0 * np.pi * np.arange(points) / points:
-            way = np.array([np.cos(phase), np.sin(phase)])
-            self.M = M + (1.0 + way[0]) * self.heavier
-            self.L = np.linalg.cholesky(self.M)
-            self.bias = bias + way @ self.pulls
-            self.J = [one + np.tensordot(way, self.turns, 1) for one in J]
-            self.h = (1.0, 1.0, 0.5 - 0.5 * way[0])
-            found.append(realise(self.wish(), self.sets(self.h, 200.0), self.limits))
-        return np.array([one.tau for one in found]), sum(one.projected for one in found)
+        way = np.array([np.cos(phase), np.sin(phase)])
+        self.M = M + (1.0 + way[0]) * self.heavier
+        self.L = np.linalg.cholesky(self.M)
+        self.bias = bias + way @ self.pulls
+        self.J = [one + np.tensordot(way, self.turns, 1) for one in J]
+        self.h = (1.0, 1.0, 0.5 - 0.5 * way[0])
+        return realise(self.wish(), self.sets(self.h, 200.0), self.limits)
 
+    def steps(self, phases):
+        """Largest step of a torque from each of these places to the next; where something gave way."""
+        found = [self.at(phase) for phase in phases]
+        steps = np.max(np.abs(np.diff([one.tau for one in found], axis=0)), axis=1)
+        return steps, np.array([one.projected for one in found])
 
-def largest_step(taus):
-    return np.max(np.abs(np.diff(taus, axis=0, append=taus[:1])))
+    def steepest(self, start, end):
+        """Ends and step of the steepest quarter of a stretch."""
+        phases = np.linspace(start, end, 5)
+        steps, _ = self.steps(phases)
+        k = int(np.argmax(steps))
+        return phases[k], phases[k + 1], steps[k]
 
 
 @pytest.mark.parametrize(
     ("seed", "points"),
-    [(0, 100), *(pytest.param(seed, 1500, marks=pytest.mark.slow) for seed in range(4))],
+    [(0, 100), *(pytest.param(seed, 1500, marks=pytest.mark.slow) for seed in range(8))],
 )
-def test_four_times_as_many_points_of_a_loop_make_a_quarter_of_the_step(seed, points):
-    """It jumps nowhere: a contact comes and goes on the way, and limits act, mostly or always."""
+def test_a_quarter_of_the_way_makes_a_quarter_of_the_step_wherever_it_is_steep(seed, points):
+    """It jumps nowhere: a contact comes and goes on the loop, and limits act, mostly or always.
+
+    The first two cuts find the steepest part of a stretch, which may be shorter than the stretch.
+    """
     loop = Loop(seed)
-    (coarse, limited), (fine, _) = loop.taus(points), loop.taus(4 * points)
-    ratio = largest_step(coarse) / largest_step(fine)
-    print(seed, points, limited, largest_step(coarse), ratio)
-    assert limited > 0.7 * points
-    assert 3.5 <= ratio <= 4.5
+    phases = np.linspace(0.0, 2.0 * np.pi, points + 1)
+    steps, limited = loop.steps(phases)
+    assert np.mean(limited) > 0.7
+    for k in np.argsort(steps)[-10:]:
+        start, end, step = loop.steepest(phases[k], phases[k + 1])
+        start, end, step = loop.steepest(start, end)
+        for _ in range(3):
+            start, end, finer = loop.steepest(start, end)
+            assert 3.5 <= step / finer <= 4.5
+            step = finer
 
 
 def test_in_flight_the_base_falls_and_the_joints_do_what_they_can():
