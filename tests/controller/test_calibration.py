@@ -2,13 +2,17 @@
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from opspace.controller import Controller
 from opspace.loop import simulate
+from opspace.plan.calibration import KNOWN, Workspace
 from opspace.robots import load_robot
 from opspace.sim import Plant
 from opspace.stack import Stack
 from opspace.tasks import MinimumJerk, PoseTask, PositionTask, PostureTask
+from tests.budget import examples
 
 LINK = (
     '<inertial><origin xyz="0.2 0 0"/><mass value="2"/>'
@@ -68,3 +72,18 @@ def test_a_frame_that_nothing_moves_is_no_division_by_zero():
     stack = Stack([PoseTask(robot.frame_names[0]), PostureTask()])
     tau = Controller(robot, stack).step(0.0, robot.q_reference, np.zeros(6)).tau
     assert np.all(np.isfinite(tau))
+
+
+@given(st.floats(-0.3, 0.3), st.sampled_from(["world", "tool"]))
+@examples(6)
+def test_what_is_known_of_a_robot_is_what_another_one_like_it_finds(offset, axes_frame):
+    """Also where the point is another one, which has another reference."""
+    tasks = [
+        PositionTask(target=np.zeros(3), offset=(0.0, 0.0, z), axes="xz", axes_frame=axes_frame)
+        for z in (offset, offset + 0.01, offset)
+    ]
+    found = [Workspace(load_robot("ur5")).reference(task) for task in tasks]
+    assert np.array_equal(found[0], found[2])
+    assert not np.array_equal(found[0], found[1])
+    KNOWN.clear()
+    assert np.array_equal(found[1], Workspace(load_robot("ur5")).reference(tasks[1]))

@@ -345,7 +345,7 @@ class AdapterBase(ABC):
         """
         try:
             return self._table.ids[name]
-        except KeyError:
+        except (KeyError, TypeError):
             raise unknown_name(f"frame of {self.name}", name, self.frame_names) from None
 
     def position(self, frame: int | str) -> np.ndarray:

@@ -193,8 +193,13 @@ class Plant:
         applied = np.clip(asked, *self._ends)
         push = self._hand.torque(self.t, self._own(self.data.qpos), self._own(self.data.qvel))
         given = applied if push is None else applied + push
-        for _ in range(self._substeps):
-            self._step(given)
+        if self._world:
+            for _ in range(self._substeps):
+                self._step(
+                    given + self._world.torque(self._own(self.data.qpos), self._own(self.data.qvel))
+                )
+        else:
+            self._step(given, self._substeps)
 
     def wrenches(self) -> dict[str, np.ndarray]:
         """Measure the wrench of the tool on what it touches, as `opspace.Controller.step` takes it.
@@ -219,15 +224,12 @@ class Plant:
             self._world.torque(self.q, self.v)
         return self._world.wrench.copy()
 
-    def _step(self, given: np.ndarray) -> None:
-        if self._world:
-            q, v = self._own(self.data.qpos), self._own(self.data.qvel)
-            given = given + self._world.torque(q, v)
+    def _step(self, given: np.ndarray, count: int = 1) -> None:
         if self._spread is None:
             self.data.qfrc_applied[:] = given
         else:
             self.data.qfrc_applied[self._spread.leaders] = given
-        self._mujoco.mj_step(self.model, self.data)
+        self._mujoco.mj_step(self.model, self.data, nstep=count)
 
     @property
     def contact_forces(self) -> dict[str, np.ndarray]:
