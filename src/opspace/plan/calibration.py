@@ -72,7 +72,7 @@ class Workspace:
         inertias, at_rest = (np.array(part) for part in zip(*visited, strict=True))
         _check_inertias(robot, inertias)
         self._inverses = np.linalg.inv(inertias)
-        self._stamp = sha256(np.ascontiguousarray(inertias)).digest()
+        self._stamp = sha256(inertias.tobytes()).digest()
         self.joint_sigma = float(np.linalg.eigvalsh(self._inverses)[:, 0].min())
         spare = np.maximum(motors.limit - np.abs(at_rest - motors.middle), 0.0)
         brake = np.min(0.5 * spare * np.diagonal(self._inverses, axis1=1, axis2=2), axis=0)
