@@ -113,6 +113,7 @@ def test_the_references_are_todays(script):
         assert_close(row, old)
 
 
+@pytest.mark.slow
 def test_the_wrist_and_one_buffer_are_todays(script):
     document = script("buffer_document")
     wrist = document.read_csv(EVIDENCE / "buffer_singularities.csv")[5]
