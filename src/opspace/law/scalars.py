@@ -700,8 +700,10 @@ shared."""
 SOFT_APART = 1.5e-2
 """How soft bounds on distances are in the first projections: where rows of neighbouring balls are nearly
 one, the answer goes from one to the other over as much of their difference. What is left of an excess is
-small then, and projected away with bounds as hard as the others, so that a distance gives way to a joint
-limit no more than that one to it."""
+small then, and projected away with harder bounds."""
+SOFT_AFTER = 1e-4
+"""How soft bounds on distances are then: where one contradicts a joint's bound, as a body that drives an
+arm against its limits does, it is the distance that gives way, to all but a thousandth."""
 HANDOVERS = 2
 """How many projections are as soft."""
 CLEANINGS = 3
@@ -711,7 +713,7 @@ left of an excess because its bounds are soft becomes smaller by their softness.
 
 def hardened(softness: float) -> float:
     """Softness of a bound after `HANDOVERS` projections; only distances are as soft as `SOFT_APART`."""
-    return softness - SOFT_APART + SOFT if softness >= SOFT_APART else softness
+    return softness - SOFT_APART + SOFT_AFTER if softness >= SOFT_APART else softness
 
 
 HARD = 1e-12
