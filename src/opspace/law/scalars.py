@@ -701,9 +701,9 @@ SOFT_APART = 1.5e-2
 """How soft bounds on distances are in the first projections: where rows of neighbouring balls are nearly
 one, the answer goes from one to the other over as much of their difference. What is left of an excess is
 small then, and projected away with harder bounds."""
-SOFT_AFTER = 1e-4
+SOFT_AFTER = 1e-3
 """How soft bounds on distances are then: where one contradicts a joint's bound, as a body that drives an
-arm against its limits does, it is the distance that gives way, to all but a thousandth."""
+arm against its limits does, it is the distance that gives way, to all but a ten-thousandth."""
 HANDOVERS = 2
 """How many projections are as soft."""
 CLEANINGS = 3
