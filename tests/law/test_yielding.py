@@ -111,6 +111,21 @@ def test_what_cannot_be_kept_does_not_take_the_other_bounds_with_it():
     assert hard.acceleration[0] > 2.0  # as hard as others it pushes the joint through its bound
 
 
+@given(seed=SEEDS, beyond=st.floats(0.1, 100.0))
+@examples(20)
+def test_a_distance_gives_way_where_it_contradicts_the_limit_of_a_joint(seed, beyond):
+    """A body drives a joint against its limit: the joint stays, to a ten-thousandth of what is asked."""
+    _, L, W, x, _, _ = problem(seed)
+    n, free = x.size, np.full(x.size, np.inf)
+    joint, upper = seed % n, free.copy()
+    upper[joint] = x[joint] - 1.0
+    G, most = -np.eye(n)[[joint]], np.array([-upper[joint] - beyond])
+    found = nearest_acceleration(
+        L, W, x, -free, upper, -free, free, G, most, np.array([SOFT_APART])
+    )
+    assert found.acceleration[joint] <= upper[joint] + 2e-4 * (beyond + 1.0)
+
+
 def test_without_known_motors_all_rows_are_equally_hard():
     G, most = np.array([[1e-9, 0.0], [0.0, 1.0]]), np.array([-5.0, 1.0])
     least, nobody = np.full(2, LEAST), np.full(2, np.inf)
