@@ -298,6 +298,7 @@ class ReferenceController:
             self._loading.resume()
         if self._fall is not None:
             self._fall.forget()
+        self._rules.unrest.forget()
         self.stack.resume()
 
     def hand_back(self, tau: ArrayLike, duration: float = 0.5) -> None:
