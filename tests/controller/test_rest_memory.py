@@ -144,9 +144,7 @@ def test_many_states_are_each_the_next_tick_and_change_nothing():
             np.testing.assert_array_equal(found[-1], controller.step(t, here, v).tau)
         else:
             controller.step(t, here, v)
-        np.testing.assert_array_equal(
-            controller.step(t, here, v).tau, alone.step(t, here, v).tau
-        )
+        np.testing.assert_array_equal(controller.step(t, here, v).tau, alone.step(t, here, v).tau)
 
 
 def test_a_task_that_stands_at_its_target_is_at_rest_only_after_a_while():
@@ -171,9 +169,7 @@ def test_torque_goes_on_where_a_target_jumps_to_and_from_far_away():
         resting = controller.step(k * DT, q, still)
     hand.set_target(hand.target + [0.0, 0.0, 0.8])
     jumped = controller.step(1.0, q, still)
-    np.testing.assert_allclose(
-        jumped.levels[1].activation, resting.levels[1].activation, atol=0.02
-    )
+    np.testing.assert_allclose(jumped.levels[1].activation, resting.levels[1].activation, atol=0.02)
     for k in range(1001, 2000):
         moving = controller.step(k * DT, q, still)
     assert moving.levels[1].activation.min() < 0.1

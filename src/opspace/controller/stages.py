@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
@@ -106,8 +105,7 @@ def sum_of_hard_torques(asked: Question) -> tuple[np.ndarray, LawInfo]:
 
 @dataclass(frozen=True)
 class Rules:
-    """What is the same in every tick, except for what ``blending``, ``observer`` and
-    ``unrest`` remember.
+    """What is the same in every tick, but for what ``blending``, ``observer`` and ``unrest`` remember.
 
     Attributes:
         law: Torque of task sets.

@@ -287,9 +287,7 @@ class Plan:
         self.tick.row_unrest[:] = found
         self.tick.unrest_at[0] = NEVER if before is None else before.tick.unrest_at[0]
 
-    def leave(
-        self, members: Sequence[Member], blending: Blending, unrest: UnrestMemory
-    ) -> None:
+    def leave(self, members: Sequence[Member], blending: Blending, unrest: UnrestMemory) -> None:
         """Let the readable form go on with these tasks where this plan was at the tick before."""
         blending.remember(dict(zip(self.variables, self.tick.group.tolist(), strict=True)))
         rows = zip(self.variables, self.packed, strict=False)
