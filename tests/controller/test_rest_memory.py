@@ -173,3 +173,28 @@ def test_torque_goes_on_where_a_target_jumps_to_and_from_far_away():
     for k in range(1001, 2000):
         moving = controller.step(k * DT, q, still)
     assert moving.levels[1].activation.min() < 0.1
+
+
+def largest_step(option):
+    """Largest torque step of an arm that is led 0.1 m out of reach within 2 s, and back at once."""
+    robot = osc.load_robot("ur5")
+    robot.update(robot.q_reference, np.zeros(robot.nv))
+    start = robot.position(robot.tool).copy()
+    goal = start + [0.39, 0.0, 0.0]
+    out = osc.MinimumJerk(start, goal, 2.0, start_time=0.1)
+    back = osc.MinimumJerk(goal, start, 2.0, start_time=2.1)
+    hand = osc.PositionTask(target=osc.Chain((0.0, out), (2.1, back)))
+    stack = osc.Stack([osc.OrientationTask(), hand, osc.PostureTask(kp=25.0)])
+    seen = []
+
+    class Watch:
+        def observe(self, q, v, command):
+            seen.append(command.tau)
+
+    controller = osc.Controller(robot, stack, singularity=option)
+    osc.simulate(osc.Plant(robot, robot.q_reference), controller, 3.5, [Watch()])
+    return np.abs(np.diff(seen, axis=0)).max()
+
+
+def test_an_arm_that_turns_round_out_of_reach_is_as_smooth_as_with_the_same_buffers_at_rest():
+    assert largest_step(NEAR) <= 1.1 * largest_step(osc.Singularity())

@@ -696,7 +696,7 @@ TURN_PER_METRE = 1.0 / 0.3
 HURRY = 1.0 / 3.0
 """What goes from anything but rest to its target in 1/HURRY seconds moves fast, 1/s."""
 REST_TIME = 0.3
-"""Time constant with which it is forgotten that a row was not at rest, and with which it is learnt, s."""
+"""Time constant with which a row is taken for one at rest, and for one that is not, s."""
 MOST_UNREST = 2.0
 """More than this is not remembered: a level is anything but at rest from 1."""
 REST_LOWER, REST_RELEASE, REST_UPPER = 0.2, 0.6, 1.0
