@@ -131,6 +131,21 @@ def test_memory_goes_over_between_compiled_and_readable_ticks(monkeypatch):
         assert (compiled._plan is None) == apart
 
 
+def test_both_forms_remember_alike_where_no_task_was_that_can_be_at_rest():
+    q, hand, compiled = stretched(osc.Controller)
+    _, other, readable = stretched(ReferenceController)
+    pairs = ((compiled, hand), (readable, other))
+    for k, (t, here, v) in enumerate(course(q, 60, 6)):
+        for controller, task in pairs:
+            if k == 10:
+                controller.stack.remove("orientation", duration=0.0)
+                controller.stack.remove(task, duration=0.0)
+            if k == 30:
+                controller.stack.insert(task, 1, duration=0.0)
+        assert_same(compiled.step(t, here, v), readable.step(t, here, v))
+        assert_same_memory(compiled, readable)
+
+
 def test_many_states_are_each_the_next_tick_and_change_nothing():
     q, _, controller = stretched(osc.Controller)
     _, _, alone = stretched(osc.Controller)

@@ -352,9 +352,9 @@ def unrest_of_tasks(
 ) -> list[float]:
     """How far every task has lately been from rest at its target, with ``speed`` = ‖Lᵀ q̇‖, √J."""
     scales = k.rules.scales
+    if not scales.know_rest:
+        return [1.0] * len(k.members)
     near = [scales.near(member.task) for member in k.members]
-    if not any(each.any() for each in near):
-        return [1.0] * len(near)
     now: list[np.ndarray] = []
     for member, each, term in zip(k.members, near, terms, strict=True):
         rows = zip(each, term.error, scales.reference(member.task), strict=True)

@@ -162,6 +162,11 @@ class Scales:
         """Return `reference` of every task."""
         return [self.reference(task) for task in tasks]
 
+    @property
+    def know_rest(self) -> bool:
+        """Whether a task can be at rest at its target."""
+        return self._option is not None and self._option.near > 0.0
+
     def near(self, task: Task) -> np.ndarray:
         """Return 1/e₀ of a task's rows for `unrest_of` of the law, (m,), 0 where never at rest."""
         if self._option is None or isinstance(task, PostureTask | JointTask):
