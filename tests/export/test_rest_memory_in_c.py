@@ -9,7 +9,7 @@ from tests.export.in_c import InC, with_cc
 
 
 @with_cc
-@pytest.mark.parametrize("own_kernels", [False, True])
+@pytest.mark.parametrize("own_kernels", [False, pytest.param(True, marks=pytest.mark.slow)])
 def test_memory_is_kept_in_c_through_removals_and_restarts(own_kernels, tmp_path):
     q, hand, controller = stretched(osc.Controller)
     stack, other = controller.stack, InC(tmp_path, controller, own_kernels=own_kernels)
