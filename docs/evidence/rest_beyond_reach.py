@@ -21,13 +21,15 @@ ARMS = ("puma560", "ur5", "panda")
 BEYOND = (0.02, 0.1, 0.25, 0.4)
 SPEED = 0.2
 """Led out and back so fast, m/s."""
+WAIT = 8.0
+"""How long it waits there, s: long enough to be at rest."""
 
 
 def torque_step(name: str, beyond: float, near: float) -> float:
     """Largest torque step of an arm that is led so far out of its workspace and back, N·m per ms."""
     reach = Reach.of(name)
     way = reach.way + beyond
-    reference, back = reach.out_and_back(way, way / SPEED, 1.5)
+    reference, back = reach.out_and_back(way, way / SPEED, WAIT)
     stack = tasks(reference, with_posture=True)
     option = osc.Singularity(near=near)
     return run(

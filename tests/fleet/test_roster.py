@@ -48,7 +48,7 @@ class Rows:
         for i in range(COUNT):
             tick.q[:], tick.v[:], tick.variable[:] = Q[i], V[i], ramps[i]
             tick.group[:] = [self.groups.get((i, v), 0) for v in plan.variables]
-            plan.forget_ways()
+            plan.forget()
             assert KERNELS["tick"](t, plan.handle.address) >= 0
             self.groups.update(
                 {(i, v): g for v, g in zip(plan.variables, tick.group.tolist(), strict=True)}

@@ -281,5 +281,7 @@ def _remembered(plan: Plan) -> Record:
         "remembers": tick.kind[:, REMEMBERS].copy(),
         "turn": tick.numbers[:, TURN : TURN + 4].copy(),
         "press": tick.press[:, :MEMORY_SIZE].copy(),
+        "row_unrest": tick.row_unrest.copy(),
+        "unrest_at": tick.unrest_at.copy(),
     }
     return REMEMBERED.make({}, found)

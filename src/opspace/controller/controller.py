@@ -256,7 +256,7 @@ class Controller(ReferenceController):
     def _begin_anew(self) -> None:
         super()._begin_anew()
         if self._plan is not None:
-            self._plan.forget_ways()
+            self._plan.forget()
 
     def _learn(self, t: float, observer: DisturbanceObserver) -> int:
         """Tick with joint limits that learn what the model does not explain."""
@@ -482,7 +482,7 @@ class Controller(ReferenceController):
         plan = laid_out[1]
         plan.go_on(heritage, members)
         if self._readable:
-            plan.come_back(self._blending)
+            plan.come_back(self._blending, self._rules.unrest)
             self._readable = False
         self._plan, self._laid_out = plan, laid_out
         return laid_out
@@ -510,7 +510,7 @@ class Controller(ReferenceController):
     def _leave(self, members: tuple[Member, ...]) -> None:
         """Let the readable form go on from the compiled one."""
         if self._plan is not None:
-            self._plan.leave(members, self._blending)
+            self._plan.leave(members, self._blending, self._rules.unrest)
         self._plan, self._laid_out, self._readable = None, None, True
 
     def _touch(self, t: float) -> int:

@@ -282,9 +282,10 @@ class ReferenceController:
 
         After a stop, with a clock that went on or began anew: tasks without a target hold what they
         find, references and transitions go on from where they were, what waits for its time waits on,
-        angles take the short way, and the tick is neither late nor a jump in time. A target that is a
-        value stays what it is; give another one where the robot should not go there. Times that are
-        given from now on are those of the clock after the pause. From any thread, between two ticks.
+        angles take the short way, no task has been at rest, and the tick is neither late nor a jump in
+        time. A target that is a value stays what it is; give another one where the robot should not go
+        there. Times that are given from now on are those of the clock after the pause. From any thread,
+        between two ticks.
         """
         if self._timing is not None:
             self._timing.forget()
@@ -298,6 +299,7 @@ class ReferenceController:
             self._loading.resume()
         if self._fall is not None:
             self._fall.forget()
+        self._rules.unrest.forget()
         self.stack.resume()
 
     def hand_back(self, tau: ArrayLike, duration: float = 0.5) -> None:

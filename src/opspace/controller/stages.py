@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -47,7 +46,15 @@ from opspace.law.scalars import LOOKS, SCALED, SEEN, room_for, unrest_of
 from opspace.plan.scales import Scales
 from opspace.robots.adapter import spread_of
 from opspace.robots.protocol import Robot
-from opspace.stack import Blending, ContactMember, Member, Mixture, mixture, presences
+from opspace.stack import (
+    Blending,
+    ContactMember,
+    Member,
+    Mixture,
+    UnrestMemory,
+    mixture,
+    presences,
+)
 from opspace.tasks import JointLimits, PostureTask, TaskTerms, TrackingTask
 from opspace.tasks.activations import own_activation
 from opspace.tasks.collision_avoidance import CollisionAvoidance
@@ -98,7 +105,7 @@ def sum_of_hard_torques(asked: Question) -> tuple[np.ndarray, LawInfo]:
 
 @dataclass(frozen=True)
 class Rules:
-    """What is the same in every tick, except for what ``blending`` and ``observer`` remember.
+    """What is the same in every tick, but for what ``blending``, ``observer`` and ``unrest`` remember.
 
     Attributes:
         law: Torque of task sets.
@@ -111,6 +118,7 @@ class Rules:
         observer: Of what the model does not explain; None trusts the model.
         period: Time between two ticks, in which accelerations change, s; 0 where it is not known.
         guard: What is kept apart, None for nothing.
+        unrest: How far tasks were from rest lately.
         realise: What a robot on contacts does of what the law wants.
     """
 
@@ -124,6 +132,7 @@ class Rules:
     observer: DisturbanceObserver | None
     period: float
     guard: CollisionAvoidance | None = None
+    unrest: UnrestMemory = field(default_factory=UnrestMemory)
     realise: Realisation = nearest_with_forces
 
 
@@ -310,7 +319,7 @@ def whiten_tasks(
     members, rules = k.members, k.rules
     rank = {level: i for i, level in enumerate(mixed.levels)}
     references = rules.scales.references([members[i].task for i, _ in mixed.slots])
-    speed = float(np.linalg.norm(L.T @ k.v))
+    unrest = unrest_of_tasks(k, h, terms, float(np.linalg.norm(L.T @ k.v)))
     fade = h if rules.blending.fades_commands else [1.0] * len(h)
     sets = [
         TaskSet(
@@ -320,7 +329,7 @@ def whiten_tasks(
             1.0,
             members[i].task.name,
             reference,
-            _unrest(rules.scales.near(members[i].task), terms[i].error, speed, reference),
+            unrest[i],
         )
         for (i, level), reference in zip(mixed.slots, references, strict=True)
     ]
@@ -338,12 +347,21 @@ def whiten_tasks(
     return Blend(sets, [Weighted(w, present | {last}) for w, present in mixed.corners])
 
 
-def _unrest(near: np.ndarray, error: np.ndarray, speed: float, reference: np.ndarray) -> float:
-    """How far a task is from rest at its target, see `opspace.law.scalars.unrest_of`."""
-    if not near.any():
-        return 1.0
-    rows = zip(near.tolist(), error.tolist(), reference.tolist(), strict=True)
-    return math.sqrt(sum(unrest_of(e, x, speed, usual) for e, x, usual in rows))
+def unrest_of_tasks(
+    k: Given, h: Sequence[float], terms: Sequence[TaskTerms], speed: float
+) -> list[float]:
+    """How far every task has lately been from rest at its target, with ``speed`` = ‖Lᵀ q̇‖, √J."""
+    scales = k.rules.scales
+    if not scales.know_rest:
+        return [1.0] * len(k.members)
+    near = [scales.near(member.task) for member in k.members]
+    now: list[np.ndarray] = []
+    for member, each, term in zip(k.members, near, terms, strict=True):
+        rows = zip(each, term.error, scales.reference(member.task), strict=True)
+        now.append(np.sqrt([unrest_of(e, x, speed, usual) for e, x, usual in rows]))
+    lately = k.rules.unrest.after(k.t, k.members, h, now)
+    found = zip(near, lately, strict=True)
+    return [float(np.linalg.norm(np.where(e > 0.0, m, 1.0))) for e, m in found]
 
 
 def law(

@@ -20,7 +20,7 @@ from opspace.errors import InputError
 from opspace.export.own_kernels import frozen
 from opspace.kernels import columns, stance_columns
 from opspace.law import PROFILES, press_columns
-from opspace.law.scalars import MAY_GIVE_UP, NO_GROUP, TANH_EDGE
+from opspace.law.scalars import MAY_GIVE_UP, MOST_UNREST, NO_GROUP, TANH_EDGE
 from opspace.machine.freeze import MEMORY, Frozen
 from opspace.machine.processor import host
 from opspace.plan.entries import KERNELS
@@ -173,6 +173,7 @@ def _layout() -> str:
         "TIME_LATE_PERIODS": MISSED,
         "HALF_TURN": np.pi,
         "TANH_EDGE": TANH_EDGE,
+        "MOST_UNREST": MOST_UNREST,
         "FALL_SLACKENING": falling.SLACKENING,
         "FALL_SLOWER": falling.SLOWER,
         "FALL_LESS": falling.LESS,

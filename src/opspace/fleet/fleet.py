@@ -15,7 +15,7 @@ from opspace.fleet.precision import dtype_name
 from opspace.fleet.program import FleetProgram
 from opspace.fleet.roster import Roster
 from opspace.fleet.task_arrays import TaskArrays
-from opspace.fleet.told_arrays import ToldArrays
+from opspace.fleet.told_arrays import ToldArrays, write_rows
 from opspace.fleet.warp_library import as_warp, device_of, robots_of, warp
 from opspace.plan.plan import Plan
 from opspace.plan.scales import DEFAULT_SINGULARITY, Singularity
@@ -337,7 +337,9 @@ class Fleet:
         Args:
             robots: None for all, a mask (count,), or their numbers.
         """
-        self._roster.reset(robots_of(robots, self.count))
+        mask = robots_of(robots, self.count)
+        self._roster.reset(mask)
+        write_rows(self._ended, np.nan, mask)  # no time has passed since a tick before
 
     # --- Layout ----------------------------------------------------------------------------------
 

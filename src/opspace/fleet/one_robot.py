@@ -40,6 +40,7 @@ from opspace.kernels.many_states import brake
 from opspace.kernels.motion import P, R, measure
 from opspace.kernels.task_rows import _quaternion
 from opspace.kernels.tick import tick
+from opspace.law.scalars import MOST_UNREST
 from opspace.tasks.way_round import LARGEST_STEP
 
 FAULT = int(Status.FAULT)
@@ -68,6 +69,8 @@ def robot_tick(work, robot):
     for i in range(work.kind.shape[0]):
         if _absent(work, i):
             _rest(work, i)
+    since = robot.since[0]
+    work.unrest_at[0] = -since if since > 0.0 else 0.0
     answer = tick(0.0, work)
     if answer < 0 or not _gains_usable(work, robot) or not _wishes_usable(work, robot):
         brake(work, work.tau)
@@ -149,11 +152,18 @@ def _begin(work, robot):
             forget_sum(work, robot, i)
             forget_way(work, robot, i)
             forget_touch(work, i)
+            _forget_rest(work, i)
             robot.found[i] = robot.holds[i]
             robot.seen[i] = robot.epoch[i]
         work.kind[i, REMEMBERS] = robot.remembers[i]
         for c in range(4):
             work.numbers[i, TURN + c] = robot.turn[i, c]
+
+
+def _forget_rest(work, i):
+    """Let task i not have been at rest."""
+    for row in range(work.kind[i, FIRST_ROW], work.kind[i, FIRST_ROW] + work.kind[i, ROWS]):
+        work.row_unrest[row] = MOST_UNREST
 
 
 def _find(work, robot):

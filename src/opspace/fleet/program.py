@@ -122,7 +122,7 @@ class FleetProgram:
             place = self._address(self.workspace)
         lines = _lines(plan, arrays, given, self._address)
         integrates = any(task.integrates for task in arrays)
-        if integrates or any(task.presses for task in arrays):
+        if integrates or any(task.presses or task.rests for task in arrays):
             timing = _time_lines(arrays, self._address(ended))
             lines = lines[0] + timing[0], lines[1] + timing[1]
         numbers = layout.numbers
@@ -209,7 +209,7 @@ def _lines(
 
 
 def _time_lines(arrays: list[ToldArrays], ended: str) -> tuple[list[str], list[str]]:
-    """Write what integrals need: how long it is since the tick before, and which tasks have none."""
+    """Write how long it is since the tick before, and which tasks have no integrals."""
     last = f"((double*){ended})[i]"
     before = [f"robot.since_()(0) = real({NOW} - {last});"]
     before += [f"robot.ki_()({i}) = 0;" for i, task in enumerate(arrays) if not task.integrates]

@@ -34,9 +34,10 @@ class ToldArrays:
         is_paced: Whether it goes to new targets on ways.
         begun: When the way of each robot began, s.
         presses: Whether it needs a wrench.
+        rests: Whether it may be at rest at its target.
     """
 
-    integrates = is_paced = presses = told_motion = False
+    integrates = is_paced = presses = rests = told_motion = False
 
     def __init__(self, task: Task, count: int, dtype: Any, device: Any) -> None:
         self.task: Any = task
@@ -66,6 +67,8 @@ class ToldArrays:
         self.kv = self._filled(tick.kv[rows])
         self.activation, self.presence = self._filled(one), self._filled(one)
         self.error = self._filled(np.zeros(rows.stop - rows.start))
+        if tick.row_near[rows].any():
+            self.rests, self._unrest = True, self._filled(tick.row_unrest[rows])
         self._epoch, self._seen = self._filled(0), self._filled(-1)
 
     def begin_again(self, epoch: np.ndarray) -> None:
@@ -86,6 +89,8 @@ class ToldArrays:
         yield "in", self.activation, "work.own_()", i
         yield "out", self.presence, "work.h_()", i
         yield "out", self.error, "work.error_()", first
+        if self.rests:
+            yield "in, out", self._unrest, "work.row_unrest_()", first
         yield "in", self._epoch, "robot.epoch_()", i
         yield "in, out", self._seen, "robot.seen_()", i
 
@@ -110,7 +115,7 @@ class ToldArrays:
         return found
 
 
-def write_rows(array: Any, rows: np.ndarray, mask: np.ndarray) -> None:
+def write_rows(array: Any, rows: ArrayLike, mask: np.ndarray) -> None:
     """Write the rows of some robots into an array on the device."""
     whole = array.numpy().copy()
     whole[mask] = rows

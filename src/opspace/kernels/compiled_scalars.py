@@ -23,6 +23,7 @@ _COMPILED = _compiled()
 profile = _COMPILED["profile"]
 fade = _COMPILED["fade"]
 unrest_of = _COMPILED["unrest_of"]
+remembered_unrest = _COMPILED["remembered_unrest"]
 ramp = _COMPILED["ramp"]
 admissible_command = _COMPILED["admissible_command"]
 closing_command = _COMPILED["closing_command"]

@@ -54,6 +54,9 @@ def begin_state(work, before, own):
     for p in range(before.press.shape[0]):
         for c in range(MEMORY_SIZE):
             work.press[p, c] = before.press[p, c]
+    for row in range(before.row_unrest.shape[0]):
+        work.row_unrest[row] = before.row_unrest[row]
+    work.unrest_at[0] = before.unrest_at[0]
 
 
 @jit

@@ -31,7 +31,7 @@ from opspace.kernels.columns import (
     TASK_BIAS,
     WORLD,
 )
-from opspace.kernels.compiled_scalars import leaning, ramp, unrest_of
+from opspace.kernels.compiled_scalars import leaning, ramp, remembered_unrest, unrest_of
 from opspace.kernels.contact_rows import close_contacts, contact_corners, evaluate_contacts
 from opspace.kernels.corners import corners, insert, sort_corners
 from opspace.kernels.distances import measure_distances
@@ -51,7 +51,7 @@ from opspace.kernels.limit_rows import begin_limits, insert_limits, keep_bounds
 from opspace.kernels.standing import stand
 from opspace.kernels.task_rows import evaluate_tasks
 from opspace.kernels.walk import begin, keep_inside, pass_on, slot_bit, walk
-from opspace.law.scalars import CHAINED, EXACT, NO_GROUP
+from opspace.law.scalars import CHAINED, EXACT, MOST_UNREST, NO_GROUP
 from opspace.law.scalars import SCALED as GIVEN_WAY
 from opspace.machine.jit import jit
 
@@ -92,7 +92,7 @@ def tick(t, work):
         if insert_limits(work):
             limit_stacks = limit_corners(work)
     evaluate_contacts(work)
-    closings = law(work, stacks, limit_stacks)
+    closings = law(t, work, stacks, limit_stacks)
     measure_distances(work)
     if work.option[BASE] != 0.0:
         kept = stand(work, stacks, closings)
@@ -258,23 +258,37 @@ def damp_rest(work, n):
 
 
 @jit
-def unrest_of_rows(work, n):
-    """How far every row is from rest at its target, squared, into space.unrest (rows + limits,)."""
+def unrest_of_rows(t, work, n):
+    """How far every row has lately been from rest at its target, squared, into space.unrest.
+
+    A task that is absent has not been at rest. Reads and writes row_unrest (rows,) and unrest_at.
+    """
     speed = 0.0
     for a in range(n):
         speed += work.space.motion[a] * work.space.motion[a]
     speed = math.sqrt(speed)
-    for row in range(work.error.shape[0]):
-        weight = work.row_weight[row]
-        work.space.unrest[row] = unrest_of(
-            work.row_near[row], work.error[row], speed, 1.0 / (weight * weight)
-        )
+    passed = t - work.unrest_at[0]
+    work.unrest_at[0] = t
+    for i in range(work.kind.shape[0]):
+        first = work.kind[i, FIRST_ROW]
+        for row in range(first, first + work.kind[i, ROWS]):
+            unrest = 1.0
+            if work.row_near[row] > 0.0:
+                unrest = MOST_UNREST
+                if work.h[i] > 0.0:
+                    weight = work.row_weight[row]
+                    now = unrest_of(
+                        work.row_near[row], work.error[row], speed, 1.0 / (weight * weight)
+                    )
+                    unrest = remembered_unrest(work.row_unrest[row], math.sqrt(now), passed)
+                work.row_unrest[row] = unrest
+            work.space.unrest[row] = unrest * unrest
     for row in range(work.error.shape[0], work.space.unrest.shape[0]):
         work.space.unrest[row] = 1.0
 
 
 @jit
-def law(work, stacks, limit_stacks):
+def law(t, work, stacks, limit_stacks):
     """û = Σ_T w_T H(T; f̃) of the stacks, under the joint limits that take part (Eq. 20, Eq. 23).
 
     Reads Jw, fw, the corners and rest; writes u (n,), √J/s, and what `SPACE` keeps for the report.
@@ -290,7 +304,7 @@ def law(work, stacks, limit_stacks):
         start_inside(work, n)
     if work.option[SINGULAR] != 0.0:
         whitened_of(work.inertia, work.v, space.motion)
-        unrest_of_rows(work, n)
+        unrest_of_rows(t, work, n)
     for a in range(n):
         work.u[a] = 0.0
     begin(n, levels, space)

@@ -98,6 +98,21 @@ def unrest_of(near: float, error: float, speed: float, reference: float) -> floa
     return near * near * (error * error + hurry * hurry * reference)
 
 
+def remembered_unrest(kept: float, now: float, passed: float) -> float:
+    """Evaluate how far a row has been from rest lately, from 0 to `MOST_UNREST`.
+
+    Args:
+        kept: The same at the tick before, m.
+        now: How far it is now, a: the square root of `unrest_of`.
+        passed: Time since the tick before, Δt, s; more than `LONGEST_LESSON` counts as that.
+
+    Returns:
+        m + (min(a, `MOST_UNREST`) − m) Δt/(τ + Δt), τ = `REST_TIME`: a low pass by implicit Euler.
+    """
+    passed = min(max(passed, 0.0), LONGEST_LESSON)
+    return kept + (min(now, MOST_UNREST) - kept) * passed / (REST_TIME + passed)
+
+
 def profile_derivatives(code: int, s: float) -> tuple[float, float]:
     """Evaluate dh/ds and d²h/ds²."""
     if s <= 0.0 or s >= 1.0 or code == STEP:
@@ -680,6 +695,10 @@ TURN_PER_METRE = 1.0 / 0.3
 """A task in radians is as near its target with so many times the error of one in metres, rad/m."""
 HURRY = 1.0 / 3.0
 """What goes from anything but rest to its target in 1/HURRY seconds moves fast, 1/s."""
+REST_TIME = 0.3
+"""Time constant with which a row is taken for one at rest, and for one that is not, s."""
+MOST_UNREST = 2.0
+"""More than this is not remembered: a level is anything but at rest from 1."""
 REST_LOWER, REST_RELEASE, REST_UPPER = 0.2, 0.6, 1.0
 """Edges of the buffers at rest, as multiples of the lower edge of those in motion."""
 LEFT = 0.5

@@ -22,7 +22,7 @@ from opspace.kernels.columns import (
 )
 from opspace.kernels.limit_columns import DISTURBANCE, SIGN, SPEED
 from opspace.law import PROFILES, Ramp
-from opspace.law.scalars import NO_GROUP
+from opspace.law.scalars import MOST_UNREST, NO_GROUP
 from opspace.machine.field_table import Record
 from opspace.machine.record import WORD
 from opspace.plan.memory import Sizes, make_tick
@@ -36,7 +36,8 @@ from opspace.plan.spectra import Spectra
 from opspace.robots.adapter import AdapterBase
 from opspace.robots.motion_axes import MotionAxes
 from opspace.robots.motor_range import MotorRange
-from opspace.stack import Blending, Member, Variable, variables_of
+from opspace.stack import Blending, Member, UnrestMemory, Variable, variables_of
+from opspace.stack.unrest_memory import NEVER
 from opspace.tasks import CollisionAvoidance, JointLimits
 from opspace.tasks.task import CHANGES
 
@@ -58,6 +59,7 @@ class Heritage(NamedTuple):
         variables: Those after it.
         groups: Where the group of each of them is remembered; None if all stay where they are.
         turns: The tasks with angles, each with the same task in the plan before.
+        unrests: The rows of the tasks that may be at rest, each with those in the plan before.
         ramps: The ramps that the activations are expected to have.
         packed: These as the plan's memory has them.
     """
@@ -67,6 +69,7 @@ class Heritage(NamedTuple):
     variables: tuple[Variable, ...]
     groups: tuple[memoryview | bytes, ...] | None
     turns: tuple[tuple[Packed, Packed | None], ...]
+    unrests: tuple[tuple[slice, slice | None], ...]
     ramps: tuple[Ramp, ...]
     packed: bytes
 
@@ -159,6 +162,7 @@ class Plan:
         self.handle = self.tick.handle()
         self.integrals = PackedIntegrals.of(self.packed, self.handle)
         self.spectra = Spectra(self.tick.option)
+        self._rests = bool(self.tick.row_near.any())
 
     @staticmethod
     def fits(members: Sequence[Member], axes: MotionAxes | None = None) -> bool:
@@ -213,18 +217,24 @@ class Plan:
         """
         packed = b"".join([_packed(ramp) for ramp in ramps])
         if before is self and known == variables:
-            return Heritage(before, known, variables, None, (), ramps, packed)
+            return Heritage(before, known, variables, None, (), (), ramps, packed)
         place = {} if before is None else {variable: i for i, variable in enumerate(known)}
         turns: list[tuple[Packed, Packed | None]] = []
+        unrests: list[tuple[slice, slice | None]] = []
         for one, presence in zip(self.packed, variables, strict=False):
+            i = place.get(presence)
+            earlier = None if before is None or i is None else before.packed[i]
             if one.way_round is not None:
-                i = place.get(presence)
-                turns.append((one, None if before is None or i is None else before.packed[i]))
+                turns.append((one, earlier))
+            if self._rests:
+                unrests.append((one.rows, None if earlier is None else earlier.rows))
         groups = [
             NOWHERE if before is None or (i := place.get(variable)) is None else before.group(i)
             for variable in variables
         ]
-        return Heritage(before, known, variables, tuple(groups), tuple(turns), ramps, packed)
+        return Heritage(
+            before, known, variables, tuple(groups), tuple(turns), tuple(unrests), ramps, packed
+        )
 
     def group(self, i: int) -> memoryview:
         """Return the memory of the group that an activation is in."""
@@ -244,6 +254,8 @@ class Plan:
                 packed.remember(earlier)
                 if packed.target is None:
                     self.seen = None
+            if heritage.unrests:
+                self._take_unrest(heritage)
         for force in self.forces:
             force.take_up()
         rows = self._ramps
@@ -260,24 +272,40 @@ class Plan:
             if force.task.memory.row is not force.memory:
                 force.keep()
 
-    def forget_ways(self) -> None:
-        """Let all angles take the short way at the next tick."""
+    def forget(self) -> None:
+        """Let all angles take the short way at the next tick, and no task have been at rest."""
         for packed in self.packed:
             packed.forget()
+        self.tick.row_unrest[:], self.tick.unrest_at[0] = MOST_UNREST, NEVER
 
-    def leave(self, members: Sequence[Member], blending: Blending) -> None:
+    def _take_unrest(self, heritage: Heritage) -> None:
+        """Go on from how far the tasks were from rest in the plan before."""
+        found, before = np.full(self.size.rows, MOST_UNREST), heritage.before
+        for rows, earlier in heritage.unrests:
+            if before is not None and earlier is not None:
+                found[rows] = before.tick.row_unrest[earlier]
+        self.tick.row_unrest[:] = found
+        self.tick.unrest_at[0] = NEVER if before is None else before.tick.unrest_at[0]
+
+    def leave(self, members: Sequence[Member], blending: Blending, unrest: UnrestMemory) -> None:
         """Let the readable form go on with these tasks where this plan was at the tick before."""
         blending.remember(dict(zip(self.variables, self.tick.group.tolist(), strict=True)))
+        rows = zip(self.variables, self.packed, strict=False)
+        kept = {presence: self.tick.row_unrest[one.rows].copy() for presence, one in rows}
+        unrest.remember(float(self.tick.unrest_at[0]), kept)
         for packed, member in zip(self.packed, self.members, strict=True):
             if member in members:
                 packed.leave()
 
-    def come_back(self, blending: Blending) -> None:
+    def come_back(self, blending: Blending, unrest: UnrestMemory) -> None:
         """Go on where the readable form was at the tick before."""
         groups = blending.remembered()
         self.tick.group[:] = [groups.get(v, NO_GROUP) for v in self.variables]
-        for packed in self.packed:
+        self.tick.unrest_at[0] = unrest.at
+        for packed, presence in zip(self.packed, self.variables, strict=False):
             packed.come_back()
+            rows = packed.rows
+            self.tick.row_unrest[rows] = unrest.of(presence, rows.stop - rows.start)
         self.seen = None
 
     def _pack(self, scales: Scales, presses: Mapping[int, int]) -> list[Packed]:

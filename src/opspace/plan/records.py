@@ -14,6 +14,7 @@ from opspace.kernels.columns import (
     VARIABLE_SIZE,
 )
 from opspace.law.press_columns import MEMORY_SIZE, PRESS_SIZE
+from opspace.law.scalars import MOST_UNREST
 from opspace.machine.field_table import Field, RecordTable
 from opspace.plan.bound_records import BOUNDS
 from opspace.plan.contact_records import STANCE
@@ -115,7 +116,7 @@ SPACE = RecordTable(
     _work("scale", ("widest",), "scales of reflectors"),
     _work("sigma", ("n",), "singular values"),
     _work("motion", ("n",), "whitened velocity Uᵀ q̇", "√J"),
-    _work("unrest", ("widest",), "how far each row is from rest at its target, squared", start=1.0),
+    _work("unrest", ("widest",), "how far each row was from rest lately, squared", start=1.0),
     _reported("unrest_there", (_DEPTHS,), "how far a level was when `top` was found"),
     _reported("kept", ("slot_rows", "n"), "B of each level when `top` was found"),
     _plan("first_kept", (_DEPTHS,), "row where that begins for each level", dtype=_INT),
@@ -156,6 +157,8 @@ TICK = RecordTable(
     _work("press_axes", (6, 6), "rows of a force task in world axes"),
     _plan("row_weight", ("rows",), "1/√reference", start=1.0),
     _plan("row_near", ("rows",), "1/e₀ of `opspace.law.scalars.unrest_of`", "1/m, 1/rad"),
+    _kept("row_unrest", ("rows",), "how far each row was from rest lately", start=MOST_UNREST),
+    _kept("unrest_at", (1,), "time of the tick that this is of", "s", start=math.inf),
     _plan(
         "variable", ("variables", VARIABLE_SIZE), "an activation in time, as `ramp` takes it", "s"
     ),
@@ -239,6 +242,8 @@ REMEMBERED = RecordTable(
     _caller("remembers", ("tasks",), "whether the turn is known", dtype=_INT),
     _caller("turn", ("tasks", 4), "last rotation of the task, quaternion wxyz"),
     _caller("press", ("presses", MEMORY_SIZE), "what force tasks remember"),
+    _caller("row_unrest", ("rows",), "how far each row was from rest lately"),
+    _caller("unrest_at", (1,), "time of that tick", "s"),
 )
 
 STATES = RecordTable(

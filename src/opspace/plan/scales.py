@@ -34,8 +34,9 @@ class Singularity:
     at it. With ``near`` both buffers lie lower where a level is nearly at rest at its targets: 0.01 to
     0.05 and 0.01 to 0.03 with the defaults. A level is the nearer to rest the smaller its errors are and
     the slower the robot is as a whole, see `opspace.law.scalars.unrest_of`; what is fast or far away
-    has the buffers above. For targets that can be reached: a robot that stops on its way to one that
-    cannot is taken for one at rest, and its torque moves steeply.
+    has the buffers above, and for some 0.3 s what has been. For targets that can be reached: a robot
+    that rests as near as it can to one that cannot is nearer to its singularity, and leaves it more
+    steeply.
 
     Args:
         lower: σ at and below which a direction is absent.
@@ -160,6 +161,11 @@ class Scales:
     def references(self, tasks: Iterable[Task]) -> list[np.ndarray]:
         """Return `reference` of every task."""
         return [self.reference(task) for task in tasks]
+
+    @property
+    def know_rest(self) -> bool:
+        """Whether a task can be at rest at its target."""
+        return self._option is not None and self._option.near > 0.0
 
     def near(self, task: Task) -> np.ndarray:
         """Return 1/e₀ of a task's rows for `unrest_of` of the law, (m,), 0 where never at rest."""

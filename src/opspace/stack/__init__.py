@@ -11,3 +11,4 @@ from opspace.stack.mixture import Slot as Slot
 from opspace.stack.mixture import mixture as mixture
 from opspace.stack.rehearsal import Outlook as Outlook
 from opspace.stack.stack import Stack as Stack
+from opspace.stack.unrest_memory import UnrestMemory as UnrestMemory

@@ -61,6 +61,8 @@ static void find_fields(opspace *c)
     c->kind = memory_of(c, "kind");
     c->endless = memory_of(c, "endless");
     c->group = memory_of(c, "group");
+    c->row_unrest = memory_of(c, "row_unrest");
+    c->unrest_at = memory_of(c, "unrest_at");
     c->slots = memory_of(c, "slots");
     c->slot_on = memory_of(c, "slot_on");
     c->slot_off = memory_of(c, "slot_off");
@@ -371,6 +373,11 @@ void opspace_restart(opspace *c)
     opspace_forget_fall(c);
     for (int i = 0; i < c->model->tasks; i++)
         c->kind[i * KIND_SIZE + KIND_REMEMBERS] = 0;
+    /* No task has been at rest. */
+    const opspace_task *last = c->model->task + c->model->tasks - 1;
+    for (int row = 0; c->model->tasks > 0 && row < last->first_row + last->rows; row++)
+        c->row_unrest[row] = MOST_UNREST;
+    *c->unrest_at = INFINITY;
 }
 
 const double *opspace_read(const opspace *c, const char *name, int64_t *count)

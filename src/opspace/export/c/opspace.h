@@ -190,8 +190,8 @@ int opspace_contact_row(const opspace *controller, int contact);
  * It is the caller's to change it smoothly. Returns 0, OPSPACE_NO_TASK or OPSPACE_REFUSED. */
 int opspace_set_activation(opspace *controller, int task, double activation);
 
-/* Let time go on from anywhere at the next step, and angles take the short way. Tasks on their way go on
- * from where they were, and what waits for its time waits on; times that are given from now on are those
+/* Let time go on from anywhere at the next step; angles take the short way, and no task has been at
+ * rest. Tasks on their way go on from where they were, and what waits for its time waits on; times that are given from now on are those
  * of the clock after the pause. From the thread that steps. */
 void opspace_restart(opspace *controller);
 

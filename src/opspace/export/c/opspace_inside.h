@@ -69,7 +69,7 @@ struct opspace {
     uint64_t *words;
     void *handle;
     double *q, *v, *tau, *M, *bias, *torque_limit, *torque_middle, *option;
-    double *gravity, *variable, *own, *numbers, *goal, *kp, *kv, *press;
+    double *gravity, *variable, *own, *numbers, *goal, *kp, *kv, *press, *row_unrest, *unrest_at;
     int64_t *kind, *endless, *group, *first_kept, *slots, *slot_on, *slot_off, *slot_place;
     double *state, *last;
     double before;
