@@ -15,6 +15,9 @@ from opspace.plan.calibration import Calibration, Workspace
 from opspace.robots.protocol import Robot
 from opspace.tasks import ForceTask, JointTask, PostureTask, Task
 
+NEAR = 0.3
+"""How far from its target a task in metres is anything but at rest there, m, if nobody says."""
+
 
 @dataclass(frozen=True)
 class Singularity:
@@ -30,13 +33,12 @@ class Singularity:
     a narrower release fewer reachable targets rest with an error, and an arm that has been stretched
     out comes back later, perhaps not at all.
 
-    A task that rests at its target inside the release keeps an error there, since the levels below pull
-    at it. With ``near`` both buffers lie lower where a level is nearly at rest at its targets: 0.01 to
-    0.05 and 0.01 to 0.03 with the defaults. A level is the nearer to rest the smaller its errors are and
-    the slower the robot is as a whole, see `opspace.law.scalars.unrest_of`; what is fast or far away
-    has the buffers above, and for some 0.3 s what has been. For targets that can be reached: a robot
-    that rests as near as it can to one that cannot is nearer to its singularity, and leaves it more
-    steeply.
+    A task that rests at its target inside the release would keep an error there, since the levels below
+    pull at it. So both buffers lie lower where a level has been nearly at rest at its targets for some
+    0.3 s: 0.01 to 0.05 and 0.01 to 0.03 with the defaults. A level is the nearer to rest the smaller its
+    errors are against ``near`` and the slower the robot is as a whole, see
+    `opspace.law.scalars.unrest_of`; what is fast or far away has the buffers above. A robot that waits
+    just out of reach is nearer to its singularity then, and leaves it more steeply.
 
     Args:
         lower: σ at and below which a direction is absent.
@@ -48,7 +50,8 @@ class Singularity:
             fade, and a task that rests inside it keeps an error.
         damping: Of the joint motion along a direction that answers in part, 1/s; none with release 1.
         near: How far from its target a task in metres is anything but at rest there, m; one in radians
-            is at 1 rad for each 0.3 m of it. 0 has the same buffers at rest as in motion.
+            is at 1 rad for each 0.3 m of it. 0 has the same buffers at rest as in motion; None is
+            0.3 m, or 0 with one buffer or absolute eigenvalues.
 
     Raises:
         InputError: Not 0 < lower < upper, not 0 < release <= 1, a damping or ``near`` below 0, or a
@@ -62,25 +65,31 @@ class Singularity:
     profile: str = "quintic"
     release: float = 0.4
     damping: float = field(default=10.0, repr=False)
-    near: float = field(default=0.0, repr=False)
+    near: float | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
         if self.scale not in ("relative", "absolute"):
             raise unknown_name("scale", self.scale, ("relative", "absolute"))
         if not 0.0 < self.release <= 1.0:
             raise InputError(f"release is a part of the buffer, 0 to 1, got {self.release}")
-        if not 0.0 <= self.near < float("inf"):
+        if self.near is not None and not 0.0 <= self.near < float("inf"):
             raise InputError(f"near is a distance, 0 for none, got {self.near}")
-        if self.near > 0.0 and (self.release == 1.0 or self.scale != "relative"):
+        if self.near and not self._may_rest:
             raise InputError(
                 "near takes two buffers of relative eigenvalues: release below 1, scale 'relative'"
             )
         _ = self.buffer
 
     @property
+    def _may_rest(self) -> bool:
+        return self.release < 1.0 and self.scale == "relative"
+
+    @property
     def rests_within(self) -> tuple[float, float]:
         """How near its target a task is at rest, m and rad; 0 where buffers are the same at rest."""
-        return self.near, TURN_PER_METRE * self.near
+        usual = NEAR if self._may_rest else 0.0
+        near = usual if self.near is None else self.near
+        return near, TURN_PER_METRE * near
 
     @property
     def buffer(self) -> SigmaBuffer:
@@ -165,7 +174,7 @@ class Scales:
     @property
     def know_rest(self) -> bool:
         """Whether a task can be at rest at its target."""
-        return self._option is not None and self._option.near > 0.0
+        return self._option is not None and self._option.rests_within[0] > 0.0
 
     def near(self, task: Task) -> np.ndarray:
         """Return 1/e₀ of a task's rows for `unrest_of` of the law, (m,), 0 where never at rest."""

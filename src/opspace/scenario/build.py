@@ -321,5 +321,6 @@ def _singularity(scenario: Scenario) -> Singularity | None:
         profile,
         option.release,
         option.damping,
-        option.near,
+        # Buffers that are switched are mixed by nothing.
+        0.0 if profile == SWITCH else option.near,
     )

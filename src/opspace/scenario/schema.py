@@ -52,9 +52,10 @@ class SingularityEntry(Entry):
     damping: Annotated[float, Number("1/s", at_least=0.0)] = Field(
         default=10.0, description="of the joint motion along a direction that answers in part"
     )
-    near: Annotated[float, Number("m", at_least=0.0)] = Field(
-        default=0.0,
-        description="so near its target the buffers are lower; 0 for the same at rest as in motion",
+    near: Annotated[float, Number("m", at_least=0.0)] | None = Field(
+        default=None,
+        description="so near its target the buffers are lower; 0 for the same at rest as in motion, "
+        "null for 0.3 m with two relative buffers",
     )
 
     @model_validator(mode="after")
