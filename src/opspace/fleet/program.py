@@ -52,6 +52,7 @@ ROLLED = {"cpu": '_Pragma("clang loop unroll(disable)")', "cuda": '_Pragma("unro
 EXACT = (
     *(f"opspace.kernels.{name}" for name in ("dynamics", "projection", "room_below")),
     "opspace.law.swift_motion",
+    "opspace.kernels.swift_way",
     "opspace.fleet.led_targets",
 )
 """Modules that count with sixteen digits in every fleet, as `opspace.fleet.layout.DIGITS` do."""
