@@ -29,11 +29,11 @@ int opspace_let_wait(opspace *c, const letter *asked)
     return 1;
 }
 
-/* Whether a task has gone before this time, so that it comes anew. */
+/* Whether a task has gone by this time, so that it comes anew. */
 static int has_gone(const opspace *c, int task, double t)
 {
     const double *ramp = c->variable + task * VARIABLE_SIZE;
-    return ramp[TARGET] == 0.0 && opspace_arrived(ramp, nextafter(t, -INFINITY));
+    return ramp[TARGET] == 0.0 && opspace_arrived(ramp, t);
 }
 
 static void start(opspace *c, const wish *one, double t)
