@@ -16,8 +16,7 @@ _whole = partial(_kept, dtype=np.int64)
 
 LED = RecordTable(
     "Led",
-    "Ways of tasks to their targets, in the order of the plan; of none where no task has a "
-    "``max_acceleration``. See `opspace.kernels.led_goals`.",
+    "Ways of tasks to their targets, in the order of the plan. See `opspace.kernels.led_goals`.",
     _told(
         "pace",
         ("led", 4),

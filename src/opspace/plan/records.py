@@ -42,7 +42,7 @@ SIZES = {
     "distances": "pairs of a ball and a set",
     "contacts": "contacts that can be there at once, none of a robot that is bolted down",
     "presses": "force tasks",
-    "led": "tasks, where one of them is led to its targets on ways, else 0",
+    "led": "tasks, where the tick leads them to their targets on ways, else 0",
     "led_rows": "rows of all tasks there",
     "corners": "corners that the blend can have",
     "widest": "the largest of rows + limits, n and 6 contacts, at least one",
