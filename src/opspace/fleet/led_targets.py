@@ -10,6 +10,7 @@ import math
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from opspace.kernels import led_goals
 from opspace.kernels.columns import (
     FIRST_ROW,
     JOINTS,
@@ -289,8 +290,15 @@ def lead_nowhere(work, robot):
     """Be on no way."""
 
 
+def led_already(t, work):
+    """Have targets where their ways are."""
+
+
 WITHOUT_WAYS: Mapping[Callable[..., Any], Callable[..., Any]] = {
     forget_way: forget_no_way,
     lead: lead_nowhere,
 }
 """What is called where no task has a max_acceleration, by what is called otherwise."""
+
+IN_TICK: Mapping[Callable[..., Any], Callable[..., Any]] = {led_goals.lead: led_already}
+"""The same of the tick, before which a fleet has led its tasks."""

@@ -195,8 +195,9 @@ def _turned(number, place, start):
     """Desire the orientation exp([φ]×) R_start; return the trace of it and the one desired before."""
     a, b, c = place[3, 0], place[4, 0], place[5, 0]
     angle = math.sqrt(a * a + b * b + c * c)
-    scale = math.sin(0.5 * angle) / angle if angle > 1e-150 else 0.5
-    w, a, b, c = math.cos(0.5 * angle), scale * a, scale * b, scale * c
+    sine, cosine = math.sin(0.5 * angle), math.cos(0.5 * angle)
+    scale = sine / angle if angle > 1e-150 else 0.5
+    w, a, b, c = cosine, scale * a, scale * b, scale * c
     T = (
         1.0 - 2.0 * (b * b + c * c), 2.0 * (a * b - w * c), 2.0 * (a * c + w * b),
         2.0 * (a * b + w * c), 1.0 - 2.0 * (a * a + c * c), 2.0 * (b * c - w * a),

@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import math
 
+import opspace.law.swift_motion as motions
 from opspace.kernels.compiled_scalars import compiled
-from opspace.law import swift_motion as motions
 from opspace.law.swift_motion import JERK_SHARE
 from opspace.law.way_columns import (
     ACCELERATION,
