@@ -14,9 +14,10 @@ from tests.export.test_standing_in_c import standing
 
 
 def on_ways(name):
-    """A controller whose hand goes to its target on a way, from where it is found."""
-    controller, (hand, *_) = start(name)
-    hand.max_speed, hand.max_acceleration = 0.5, 2.0
+    """A controller whose tasks go to their targets on ways, the hand from where it is found."""
+    controller, tasks = start(name)
+    for task in tasks:
+        task.max_speed, task.max_acceleration = 0.5, 2.0
     return controller
 
 
