@@ -5,8 +5,11 @@ import pytest
 
 import opspace as osc
 from opspace.controller import ReferenceController
+from opspace.plan.plan import Plan
 from opspace.tasks.rotation import exp_rotation
 from tests.export.in_c import InC, with_cc
+from tests.export.test_standing_in_c import standing
+from tests.export.test_standing_in_c import states as standing_states
 from tests.tasks.test_way_round import wrist
 
 DT = 1e-3
@@ -224,25 +227,74 @@ def test_a_goal_that_is_no_number_brakes_until_there_is_one_again():
     assert controller.step(3.0 * DT, q, v).status == 0
 
 
+@with_cc
+def test_a_robot_that_stands_leans_on_ways_alike(tmp_path):
+    controller, *_ = standing("solo12")
+    tasks = list(controller.stack)
+    for task in tasks:
+        task.max_speed, task.max_acceleration = 0.2, 1.0
+    c = InC(tmp_path, controller)
+    for k, t, q, v in standing_states(controller.robot, 60, 0.01):
+        for task in tasks:
+            if k in (10, 25):
+                turn = task.target.ndim == 2
+                goal = exp_rotation(np.full(3, 0.1)) @ task.target if turn else task.target + 0.03
+                task.target = goal
+                assert c.set("target", task, task._target.goal, None, None) == 0
+        command, (status, tau) = controller.step(t, q, v), c.step(t, q, v)
+        np.testing.assert_array_equal(tau, command.tau, err_msg=f"tick {k}")
+        assert status == command.status
+
+
+def torques(kind, name, backend, changes):
+    """Torques of either form while targets jump; changes(k, stack, guest) happen before tick k."""
+    robot_name, tasks = BUILDS[name]()
+    robot = osc.load_robot(robot_name, backend=backend)
+    tasks.append(osc.PostureTask(name="rest", kp=25.0, **PACED))
+    controller = kind(robot, osc.Stack(tasks))
+    robot.update(robot.q_reference, np.zeros(robot.nv))
+    here = [task._current(robot).copy() for task in tasks]
+    guest, found = osc.PostureTask(robot.q_reference, name="guest"), []
+    for k in range(60):
+        changes(k, controller.stack, guest)
+        for task, x in zip(tasks, here, strict=True):
+            if k in (5, 20, 38):
+                goal = x + 0.002 * k if x.ndim == 1 else x.copy()
+                if x.ndim == 2:
+                    goal[:3, :3] = exp_rotation(np.array([0.01 * k, 0.0, 0.2])) @ x[:3, :3]
+                task.target = goal
+        q = robot.q_reference + 1e-3 * np.sin(np.arange(robot.nq) + 0.1 * k)
+        found.append(controller.step(0.01 * k, q, np.zeros(robot.nv)).tau)
+        assert all(task.way is not None for task in tasks) == (k >= 5)
+        if kind is osc.Controller:
+            assert (controller._plan is not None) == Plan.fits(controller.stack.members)
+    return found
+
+
 @pytest.mark.parametrize("name", BUILDS)
-def test_the_readable_form_goes_the_same_ways(name):
-    robots, results = [osc.load_robot(BUILDS[name]()[0]) for _ in range(2)], []
-    for robot, kind in zip(robots, (osc.Controller, ReferenceController), strict=True):
-        tasks = [*BUILDS[name]()[1], osc.PostureTask(name="rest", kp=25.0, **PACED)]
-        controller = kind(robot, osc.Stack(tasks))
-        robot.update(robot.q_reference, np.zeros(robot.nv))
-        here = [task._current(robot).copy() for task in tasks]
-        taus = []
-        for k in range(60):
-            if k in (5, 20):
-                for task, x in zip(tasks, here, strict=True):
-                    turned = x.copy()
-                    if x.ndim == 1:
-                        turned += 0.002 * k
-                    else:
-                        turned[:3, :3] = exp_rotation(np.array([0.01 * k, 0.0, 0.2])) @ x[:3, :3]
-                    task.target = turned
-            q = robot.q_reference + 1e-3 * np.sin(np.arange(robot.nq) + 0.1 * k)
-            taus.append(controller.step(0.01 * k, q, np.zeros(robot.nv)).tau)
-        results.append(taus)
-    np.testing.assert_allclose(*results, rtol=1e-9, atol=1e-9)
+@pytest.mark.parametrize("backend", ["pinocchio", "mujoco"])
+def test_the_readable_form_goes_the_same_ways(name, backend):
+    """Also where the robot's library places its bodies."""
+    ours, readable = (
+        torques(kind, name, backend, lambda *_: None)
+        for kind in (osc.Controller, ReferenceController)
+    )
+    np.testing.assert_allclose(ours, readable, rtol=1e-9, atol=1e-9)
+
+
+@pytest.mark.parametrize("name", BUILDS)
+def test_either_form_goes_on_with_the_ways_of_the_other(name, monkeypatch):
+    """From the compiled tick to the readable one and back, always on ways."""
+
+    def changes(k, stack, guest):
+        compiled = not 30 <= k < 45
+        monkeypatch.setattr(Plan, "fits", staticmethod(lambda *_: compiled))
+        if k == 30:
+            stack.insert(guest, 5.0, duration=0.05)
+        if k == 45:
+            stack.remove(guest, duration=0.05)
+
+    ours, readable = (
+        torques(kind, name, "pinocchio", changes) for kind in (osc.Controller, ReferenceController)
+    )
+    np.testing.assert_allclose(ours, readable, rtol=1e-9, atol=1e-9)

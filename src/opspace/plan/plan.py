@@ -197,7 +197,7 @@ class Plan:
             self.distances.refresh(t)
         self.moving = any(packed.moving for packed in self.packed)
         self.moving |= self.distances is not None and self.distances.moving
-        self.asks = any(packed.led is not None and packed.led.asked for packed in self.packed)
+        self.asks = self._asks()
         self.seen = last
 
     def note_ways(self) -> None:
@@ -205,7 +205,7 @@ class Plan:
         for packed in self.packed:
             if packed.led is not None:
                 packed.led.note()
-        self.asks = False
+        self.asks = self._asks()
 
     def disturb(self, acceleration: np.ndarray) -> None:
         """Tell the joint limits what comes on top of the commanded accelerations, (n,) rad/s²."""
@@ -295,6 +295,9 @@ class Plan:
         for packed in self.packed:
             packed.come_back()
         self.seen = None
+
+    def _asks(self) -> bool:
+        return any(packed.led is not None and packed.led.asked for packed in self.packed)
 
     def _pack(self, scales: Scales, presses: Mapping[int, int]) -> list[Packed]:
         packed: list[Packed] = []
