@@ -348,6 +348,8 @@ def compare(
     print()
     for name in found.rows:
         print(f"{name}: {METHODS[name].title} ({METHODS[name].limits})")
+    for name, why in found.left_out.items():
+        print(f"left out: {name}, {why}")
     print(f"results: {out}")
 
 

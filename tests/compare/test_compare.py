@@ -1,6 +1,8 @@
 """Other methods run under the same protocol, and are what their names say."""
 
 import json
+import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,7 +11,7 @@ from tests.scenario.short import HOLD, short
 from opspace.cli import main
 from opspace.compare import METHODS, compare_scenario
 from opspace.compare.laws import continuous_inverse, damped_inverse, stack_of_tasks
-from opspace.compare.methods import usable_methods
+from opspace.compare.methods import methods_left_out, usable_methods
 from opspace.compare.tsid_model import tsid_installed
 from opspace.errors import InputError, UnknownNameError
 from opspace.law import TaskSet, task_torque
@@ -147,6 +149,49 @@ def test_tsid_is_left_out_where_it_is_not_installed(monkeypatch):
     built = build(short(), METHODS["tsid"].controller)
     with pytest.raises(InputError, match="needs TSID's Python package"):
         built.controller.step(0.0, built.plant.q, built.plant.v)
+
+
+@pytest.fixture
+def with_tsid(monkeypatch):
+    """A TSID that is there, as far as is asked of it."""
+    there = replace(METHODS["tsid"], installed=lambda: True)
+    few = {"opspace": METHODS["opspace"], "cbf-qp": METHODS["cbf-qp"], "tsid": there}
+    for place in ("methods", "run_methods"):
+        monkeypatch.setattr(f"opspace.compare.{place}.METHODS", few)
+    monkeypatch.setattr("opspace.compare.tsid_model.tsid_module", lambda: None)
+
+
+def test_a_method_that_cannot_run_a_scenario_is_left_out_and_says_why(with_tsid):
+    seen = {"type": "relative_position", "level": 3, "reference_frame": "link1"}
+    for scenario, why in (
+        (short(robot="ur5", collisions={}), "keeps nothing apart"),
+        (short(tasks={**TASKS, "seen": seen}), "no task like 'seen'"),
+        (short(), "needs a robot from a URDF, not .*xml"),
+    ):
+        assert re.search(why, methods_left_out(scenario)["tsid"])
+    assert set(methods_left_out(load_scenario("humanoid"))) == {"cbf-qp"}
+
+
+def test_what_is_left_out_is_told_and_what_is_named_is_not(with_tsid, tmp_path, capsys):
+    path, out = tmp_path / "my.yaml", tmp_path / "out"
+    path.write_text(dump_scenario(short()), encoding="utf-8")
+    with pytest.raises(SystemExit) as raised:
+        main(["compare", str(path), "--out", str(out)])
+    assert raised.value.code == 0
+    assert "left out: tsid, the method tsid needs a robot from a URDF" in capsys.readouterr().out
+    found = json.loads((out / "compare.json").read_text(encoding="utf-8"))
+    assert list(found["methods"]) == ["opspace", "cbf-qp"]
+    assert list(found["left_out"]) == ["tsid"]
+    with pytest.raises(InputError, match="needs a robot from a URDF"):
+        compare_scenario(short(), ["tsid"])
+
+
+def test_a_tsid_that_does_not_import_is_left_out(with_tsid, monkeypatch):
+    def broken():
+        raise InputError("the one that is there does not import")
+
+    monkeypatch.setattr("opspace.compare.tsid_model.tsid_module", broken)
+    assert methods_left_out(short(robot="ur5"))["tsid"].endswith("does not import")
 
 
 @pytest.mark.skipif(not tsid_installed(), reason="needs TSID's Python package")

@@ -25,6 +25,8 @@ MAY_IMPORT = (
     "kernels",
     "law.press_columns",
     "law.scalars",
+    "law.swift_motion",
+    "law.way_columns",
     "law",
     "command",
     "machine.jit",

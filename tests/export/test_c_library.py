@@ -465,7 +465,6 @@ def own_activation():
             with_task(osc.PositionTask(target=osc.MinimumJerk(X, np.add(X, 0.1), 1.0))),
             "reference in time",
         ),
-        (with_task(osc.PositionTask(target=X, max_acceleration=1.0, max_speed=1.0)), "max_acc"),
         (with_task(own_activation()), "activation"),
     ],
 )

@@ -12,11 +12,21 @@ from tests.export.test_c_library import start
 from tests.export.test_integrals_in_c import learning
 from tests.export.test_standing_in_c import standing
 
+
+def on_ways(name):
+    """A controller whose tasks go to their targets on ways, the hand from where it is found."""
+    controller, tasks = start(name)
+    for task in tasks:
+        task.max_speed, task.max_acceleration = 0.5, 2.0
+    return controller
+
+
 MOVES = {"arm that learns": 0}
 """How many moves there are at once; without any, levels are constant as well."""
 BUILDS = {
     "arm that moves tasks": lambda: start("puma560", torque_limits="priority")[0],
     "arm that learns": lambda: learning("panda", "tool")[0],
+    "arm on ways": lambda: on_ways("puma560"),
     "quadruped": lambda: standing("solo12")[0],
 }
 

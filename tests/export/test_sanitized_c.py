@@ -8,6 +8,7 @@ import pytest
 import opspace as osc
 from tests.export.in_c import CC, STRICT, with_cc
 from tests.export.test_moves_in_c import four
+from tests.export.test_own_kernels import on_ways
 from tests.export.test_standing_in_c import standing
 
 PROGRAM = """
@@ -25,6 +26,18 @@ static int one_of(int count)
     return (int)((seed >> 8) % (unsigned)count);
 }
 
+/* Sends a task somewhere, with a velocity or without. */
+static void aim(opspace *c, const opspace_task *one, int task)
+{
+    double x[12 + CONTROLLER_N] = {0.0}, velocity[6 + CONTROLLER_N] = {0.0};
+    for (int i = 0; i < one->position + one->joints; i++)
+        x[i] = 1e-2 * one_of(50);
+    for (int i = 0; i < one->orientation; i += 4)
+        x[one->position + i] = 1.0;
+    velocity[0] = 1e-2 * one_of(2);
+    opspace_set_target(c, task, x, one_of(2) ? velocity : NULL, NULL);
+}
+
 /* Asks for anything that a program may ask for. */
 static void ask(opspace *c, double t)
 {
@@ -32,7 +45,7 @@ static void ask(opspace *c, double t)
     double level = m->level[one_of(m->levels)], duration = 0.01 * one_of(5);
     double start = t + 0.005 * (one_of(7) - 3);
     int first = one_of(m->tasks), second = one_of(m->tasks);
-    switch (one_of(4)) {
+    switch (one_of(5)) {
     case 0:
         opspace_move(c, first, level, start, duration);
         break;
@@ -41,6 +54,9 @@ static void ask(opspace *c, double t)
         break;
     case 2:
         opspace_set_presence(c, first, one_of(2), start, duration);
+        break;
+    case 3:
+        aim(c, &m->task[first], first);
         break;
     default:
         opspace_set_contact(c, one_of(m->contacts + 1), one_of(2), duration, one_of(2));
@@ -76,7 +92,11 @@ int main(void)
     return EXIT_SUCCESS;
 }
 """
-BUILDS = {"arm": lambda: four()[0], "quadruped": lambda: standing("solo12")[0]}
+BUILDS = {
+    "arm": lambda: four()[0],
+    "arm on ways": lambda: on_ways("puma560"),
+    "quadruped": lambda: standing("solo12")[0],
+}
 
 
 def built(folder, name, *options):

@@ -79,6 +79,51 @@ def test_contacts_come_and_go_as_in_a_stack(name, tmp_path):
 
 
 @with_cc
+def test_a_foot_rolls_over_its_toes_and_back_as_in_a_stack(tmp_path):
+    """An edge comes, carries what a sole has carried, which waits and then leaves anyhow, and goes."""
+
+    def on_its_toes():
+        controller, (left, *_), _ = standing("g1")
+        middle = np.add(left.offset, (left.half[0], 0.0, 0.0))
+        toes = osc.EdgeContact(left.frame, left.half[1], offset=middle, name="toes")
+        controller.stack.insert(toes, 0.0)
+        controller.stack.remove("wall", 0.0)
+        controller.stack.begin_contacts(0.0)
+        return controller, left, toes
+
+    controller, left, toes = on_its_toes()
+    controller.stack.remove(toes, 0.0)
+    c, stack = InC(tmp_path, on_its_toes()[0], absent=["toes"]), controller.stack
+    carried, gone, waited = 0.0, False, False
+    for k, t, q, v in states(controller.robot, 130, 0.003):
+        for at, contact, present, duration in (
+            (5, toes, 1, 0.1), (20, left, 0, 0.2), (60, left, 1, 0.1), (63, left, 0, 0.1),
+            (80, left, 1, 0.05), (95, toes, 0, 0.2), (100, toes, 1, 0.1), (115, toes, 0, 0.05),
+        ):  # fmt: skip
+            if k == at:
+                wait = k != 63
+                if present:
+                    stack.insert(contact, duration)
+                else:
+                    stack.remove(contact, duration=duration, wait=wait)
+                assert c.touch(contact, present, duration, wait=wait) == 0
+        command, (status, tau) = controller.step(t, q, v), c.step(t, q, v)
+        np.testing.assert_array_equal(tau, command.tau, err_msg=f"tick {k}")
+        assert status == command.status
+        gone |= "left" not in command.contacts
+        waited |= bool(osc.Status.CONTACT_WAITS & status)
+        if "toes" in command.contacts:
+            row = c.contact_row(toes)
+            force = controller._plan.tick.contact_force[row]
+            np.testing.assert_array_equal(c.read("contact_force").reshape(-1, 6)[row], force)
+            carried = max(carried, force[2])
+    assert carried > 120.0
+    assert waited
+    assert gone
+    assert "toes" not in command.contacts
+
+
+@with_cc
 @pytest.mark.parametrize("robot_adds", [None, False, True])
 def test_brakes_give_the_same_bits(robot_adds, tmp_path):
     """A target that is no number brakes; a robot that stands, from the torque that carried it."""

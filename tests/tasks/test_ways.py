@@ -37,7 +37,7 @@ def assert_within(samples, dt):
 @given(vectors, vectors)
 def test_a_way_from_rest_is_straight_and_within_its_limits(start, goal):
     rest = np.zeros(3)
-    way = VectorWay(osc.Sample(start, rest, rest), goal, 2.0, PACE)
+    way = VectorWay.to(osc.Sample(start, rest, rest), goal, 2.0, PACE)
     times = np.linspace(2.0, way.end, 80)
     samples = [way(t) for t in times]
     assert_within(samples, max(times[1] - times[0], 1e-9))
@@ -52,7 +52,7 @@ def test_a_way_from_rest_is_straight_and_within_its_limits(start, goal):
 @given(vectors, vectors)
 def test_a_turn_from_rest_is_about_one_axis_and_within_its_limits(first, second):
     rest, R, goal = np.zeros(3), exp_rotation(first), exp_rotation(second)
-    way = RotationWay(osc.Sample(R, rest, rest), goal, 0.0, PACE)
+    way = RotationWay.to(osc.Sample(R, rest, rest), goal, 0.0, PACE)
     times = np.linspace(0.0, way.end, 60)
     samples = [way(t) for t in times]
     assert_within(samples, max(times[1] - times[0], 1e-9))
@@ -71,7 +71,7 @@ def test_a_way_begins_with_what_is_followed(start, goal, velocity, acceleration)
     now = osc.Sample(
         pose, np.concatenate((velocity, acceleration)), np.concatenate((acceleration, velocity))
     )
-    way = PoseWay(now, end, 3.0, PACE, PACE)
+    way = PoseWay.to(now, end, 3.0, PACE, PACE)
     for one, two in zip(way(3.0), now, strict=True):
         np.testing.assert_allclose(one, two, atol=1e-9)
     np.testing.assert_allclose(way(way.end).x, end, atol=1e-12)

@@ -14,8 +14,9 @@ from opspace.compare.laws import continuous_inverse, damped_inverse
 from opspace.compare.projections import BarrierProgram
 from opspace.compare.strict_program import StrictProgramController, daqp_installed
 from opspace.compare.tsid_controller import TsidController
-from opspace.compare.tsid_model import tsid_installed
+from opspace.compare.tsid_model import lacks_in_tsid, tsid_installed
 from opspace.controller import Controller, ReferenceController
+from opspace.robots.protocol import Robot
 from opspace.scenario import Scenario
 from opspace.scenario.build import build_robot
 
@@ -31,6 +32,7 @@ class Method:
         changes: What it changes in a scenario.
         profile: Profile of every event; None leaves them as they are.
         installed: Whether the package that it needs is there.
+        lacks: Says what it lacks for a scenario with this robot; empty where that is nothing.
         stands: Whether it can drive a robot that stands on contacts.
         bolted: Whether it can drive one that is bolted down.
     """
@@ -41,6 +43,7 @@ class Method:
     changes: Mapping[str, Any] = field(default_factory=dict[str, Any])
     profile: str | None = None
     installed: Callable[[], bool] = lambda: True
+    lacks: Callable[[Scenario, Robot], str] = lambda scenario, robot: ""
     stands: bool = True
     bolted: bool = True
 
@@ -51,6 +54,19 @@ class Method:
             profile = {"profile": self.profile}
             changes["events"] = [event.model_copy(update=profile) for event in scenario.events]
         return scenario.model_copy(update=changes)
+
+
+TSID_TASKS = ("position", "orientation", "pose", "posture", "joint", "com")
+"""Types of tasks that TSID has as well."""
+
+
+def _lacks_in_tsid(scenario: Scenario, robot: Robot) -> str:
+    if scenario.collisions is not None:
+        return "it keeps nothing apart"
+    others = [name for name, task in scenario.tasks.items() if task.type not in TSID_TASKS]
+    if others:
+        return f"it has no task like {', '.join(map(repr, others))}"
+    return lacks_in_tsid(robot)
 
 
 _FADE, _SWITCH = "both fade", "both switch"
@@ -130,6 +146,7 @@ METHODS: Mapping[str, Method] = MappingProxyType(
             "no joint limits for an arm; no sigma buffer",
             TsidController,
             installed=tsid_installed,
+            lacks=_lacks_in_tsid,
         ),
     }
 )
@@ -137,10 +154,24 @@ METHODS: Mapping[str, Method] = MappingProxyType(
 
 
 def usable_methods(scenario: Scenario) -> list[str]:
-    """Name the methods that are installed and can drive the robot of a scenario."""
-    floats = bool(scenario.contacts) or build_robot(scenario).floating_base
-    return [
-        name
-        for name, method in METHODS.items()
-        if method.installed() and (method.stands if floats else method.bolted)
-    ]
+    """Name the methods that are installed and can run a scenario."""
+    left_out = methods_left_out(scenario)
+    return [name for name in METHODS if name not in left_out]
+
+
+def methods_left_out(scenario: Scenario) -> dict[str, str]:
+    """Say of every other method why it cannot run a scenario, by name."""
+    robot = build_robot(scenario)
+    stands = bool(scenario.contacts) or robot.floating_base
+    found = {name: _why_not(method, scenario, robot, stands) for name, method in METHODS.items()}
+    return {name: why for name, why in found.items() if why}
+
+
+def _why_not(method: Method, scenario: Scenario, robot: Robot, stands: bool) -> str:
+    if not method.installed():
+        return "what it needs is not installed"
+    if stands and not method.stands:
+        return "it drives no robot that stands on contacts"
+    if not stands and not method.bolted:
+        return "it drives no robot that is bolted down"
+    return method.lacks(scenario, robot)

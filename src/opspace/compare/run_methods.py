@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
 from opspace.compare.measures import Measures, Timed, Watch, measure
-from opspace.compare.methods import METHODS, usable_methods
+from opspace.compare.methods import METHODS, methods_left_out
 from opspace.errors import unknown_name
 from opspace.loop import StopRule, simulate
 from opspace.plots import save
@@ -43,16 +43,19 @@ class Comparison:
     Attributes:
         scenario: What was run.
         rows: Measures by name of the method.
+        left_out: Why other methods were not run that nobody had named, by name.
     """
 
     scenario: Scenario
     rows: Mapping[str, Measures]
+    left_out: Mapping[str, str] = field(default_factory=dict[str, str])
 
     def to_json(self) -> dict[str, Any]:
         """Return everything as plain values."""
         return {
             "scenario": to_dict(self.scenario),
             "methods": {name: asdict(row) for name, row in self.rows.items()},
+            "left_out": dict(self.left_out),
         }
 
     def table(self, keys: Sequence[str] | None = None) -> tuple[list[str], list[list[str]]]:
@@ -89,7 +92,7 @@ def compare_scenario(
     Args:
         scenario: The scenario.
         methods: Names of methods; none stands for all that are installed and can
-            drive the robot.
+            run it.
         out: Directory for ``compare.json`` and ``compare.png``; None writes nothing.
         progress: Bar that gets a line for each run.
 
@@ -103,9 +106,10 @@ def compare_scenario(
     for name in methods:
         if name not in METHODS:
             raise unknown_name("method", name, METHODS)
-    wanted = methods or usable_methods(scenario)
+    left_out = {} if methods else methods_left_out(scenario)
+    wanted = methods or [name for name in METHODS if name not in left_out]
     rows = {name: _run(scenario, name, progress) for name in wanted}
-    comparison = Comparison(scenario, rows)
+    comparison = Comparison(scenario, rows, left_out)
     if out is not None:
         out.mkdir(parents=True, exist_ok=True)
         write_json(out / "compare.json", comparison.to_json())

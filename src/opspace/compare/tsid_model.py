@@ -52,6 +52,17 @@ def tsid_module() -> Any:
         raise InputError(f"{needs}; the one that is there does not import: {error}") from error
 
 
+def lacks_in_tsid(robot: Robot) -> str:
+    """Say why TSID cannot drive a robot here; empty where it can."""
+    try:
+        tsid_module()
+    except InputError as error:
+        return str(error)
+    if robot.source is None or robot.source.suffix != ".urdf":
+        return f"the method tsid needs a robot from a URDF, not {robot.source}"
+    return ""
+
+
 class TsidModel:
     """A robot of ours as TSID sees it.
 
@@ -66,6 +77,8 @@ class TsidModel:
     """
 
     def __init__(self, robot: Robot) -> None:
+        if lacking := lacks_in_tsid(robot):
+            raise InputError(lacking)
         self.tsid, self.robot = tsid_module(), robot
         self.base = 6 if robot.floating_base else 0
         self.wrapper = _wrapper(self.tsid, robot)
@@ -152,8 +165,7 @@ def _wrapper(tsid: Any, robot: Robot) -> Any:
     from opspace.robots.urdf_export import to_xml
 
     source = robot.source
-    if source is None or source.suffix != ".urdf":
-        raise InputError(f"the method tsid needs a robot from a URDF, not {source}")
+    assert source is not None  # see `lacks_in_tsid`
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "robot.urdf"
         urdf = read_urdf(source, held_joints(robot))

@@ -209,6 +209,8 @@ class Controller(ReferenceController):
                 _, plan, address, torque, memory, quiet = laid_out
             plan.refresh(robot, t)
         answer = tick(t, address) if observer is None else self._learn(t, observer)
+        if plan.asks:
+            plan.note_ways()
         if answer < 0:
             if answer == STATE_NOT_FINITE:
                 robot.check_state(robot.q, robot.v)
@@ -550,15 +552,22 @@ class Controller(ReferenceController):
         return 0 if self._collisions is None else len(self._collisions.layout().rows)
 
     def _planned(self, members: tuple[Member, ...], axes: MotionAxes) -> Plan:
-        return self._plan_of(members, axes, self._standing)
+        return self._plan_of(members, axes, self._standing, leads=True)
 
-    def _planned_apart(self, members: tuple[Member, ...], axes: MotionAxes) -> Plan:
+    def _planned_apart(
+        self, members: tuple[Member, ...], axes: MotionAxes, *, leads: bool = False
+    ) -> Plan:
         """Make a plan with contacts of its own, as every thread of a batch needs one."""
         own = self._contacts_of(axes, len(self.stack.contacts)) if self._base else None
-        return self._plan_of(members, axes, own)
+        return self._plan_of(members, axes, own, leads=leads)
 
     def _plan_of(
-        self, members: tuple[Member, ...], axes: MotionAxes, contacts: PackedContacts | None
+        self,
+        members: tuple[Member, ...],
+        axes: MotionAxes,
+        contacts: PackedContacts | None,
+        *,
+        leads: bool,
     ) -> Plan:
         return Plan(
             members,
@@ -570,6 +579,7 @@ class Controller(ReferenceController):
             self._blending,
             self._collisions,
             contacts,
+            leads=leads,
         )
 
     def _watches_all(self, plan: Plan) -> bool:

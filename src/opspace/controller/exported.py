@@ -97,7 +97,9 @@ def exported(
             "controller needs its bodies"
         )
     moves = moves if members else 0
-    plan = controller._planned_apart(_with_room(rested, numbers, moves, profile), axes)
+    leads = any(_is_led(member) for member in members)
+    room = _with_room(rested, numbers, moves, profile)
+    plan = controller._planned_apart(room, axes, leads=leads)
     for packed in plan.packed:
         if not packed.settled:
             packed.pack_value()  # what its integral adds comes later
@@ -175,6 +177,11 @@ def _check(controller: ReferenceController) -> None:
         raise InputError(f"an exported controller cannot call {own}")
 
 
+def _is_led(member: Member) -> bool:
+    """Tell whether a task goes to its targets on ways."""
+    return isinstance(member.task, TrackingTask) and member.task.max_acceleration is not None
+
+
 def _reason(packed: Packed) -> str:
     """Say why a task is not numbers that stay."""
     task = packed.task
@@ -184,8 +191,6 @@ def _reason(packed: Packed) -> str:
         why = "has an activation in Python: export it without, and set it from C"
     elif isinstance(task, TrackingTask) and task.holds_nothing_yet:
         why = "will hold what it finds at its first tick: give it a target"
-    elif task._gains.max_acceleration is not None:
-        why = "has a max_acceleration, which is kept in Python: send it targets that go on smoothly"
     else:
         why = "follows a reference in time: give it a target, and set later ones from C"
     return f"task {task.name!r} {why}"

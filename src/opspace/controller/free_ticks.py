@@ -40,7 +40,7 @@ def check_free(controller: ReferenceController) -> None:
     for task in controller.stack:
         if task._gains.max_acceleration is not None:  # pyright: ignore[reportAttributeAccessIssue]
             raise InputError(
-                f"task {task.name!r} has a max_acceleration, which is kept in Python: give it a "
+                f"task {task.name!r} has a max_acceleration, whose ways begin in Python: give it a "
                 "max_speed, and the driver a torque_rate"
             )
 

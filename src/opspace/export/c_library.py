@@ -18,9 +18,9 @@ from opspace.controller.reference import ReferenceController
 from opspace.controller.watchdog import JUMP, MISSED
 from opspace.errors import InputError
 from opspace.export.own_kernels import frozen
-from opspace.kernels import columns, stance_columns
+from opspace.kernels import columns, led_columns, stance_columns
 from opspace.law import PROFILES, press_columns
-from opspace.law.scalars import MAY_GIVE_UP, MOST_UNREST, NO_GROUP, TANH_EDGE
+from opspace.law.scalars import LARGEST_STEP, MAY_GIVE_UP, MOST_UNREST, NO_GROUP, TANH_EDGE
 from opspace.machine.freeze import MEMORY, Frozen
 from opspace.machine.processor import host
 from opspace.plan.entries import KERNELS
@@ -28,7 +28,6 @@ from opspace.plan.pack_task import Packed
 from opspace.plan.records import TICK
 from opspace.record.whole_file import whole_file
 from opspace.stack import contact_course
-from opspace.tasks.way_round import LARGEST_STEP
 
 SOURCES = Path(__file__).parent / "c"
 COLUMNS = {
@@ -47,6 +46,7 @@ PRESS = ("GIVEN", "GIVEN_AT", "WANTED", "FORCES", "ON", "KI", "KP", "PRESS_SIZE"
 INNER = (
     "space.first_kept",
     *(f"stance.{name}" for name in ("count", "rows", "place", "edges", "numbers", "motion")),
+    *(f"led.{name}" for name in ("goal", "joint_goal", "more", "joint_more", "asked", "on")),
     *(f"integrals.{name}" for name in ("ki", "integral", "joint_integral", "since")),
     *(f"stance.{name}" for name in ("force", "most", "cone", "metric", "reference", "hindrance")),
 )
@@ -187,6 +187,9 @@ def _layout() -> str:
     whole = {
         **{f"PROFILE_{one.upper().replace('-', '_')}": k for k, one in enumerate(PROFILES)},
         "GROUP_NONE": NO_GROUP,
+        "GOAL_TURN": led_columns.GOAL_TURN,
+        "GOAL_PLACE": led_columns.GOAL_PLACE,
+        "GOAL_SIZE": led_columns.GOAL_SIZE,
         "CONTACT_PLACE_SIZE": stance_columns.PLACE_SIZE,
         "CONTACT_NUMBERS_SIZE": stance_columns.NUMBERS_SIZE,
         "CONTACT_CONE_SIZE": stance_columns.MOST_EDGES * stance_columns.SOLE_ROWS,
@@ -302,9 +305,10 @@ def _task(packed: Packed, level: int) -> str:
     kind = packed._tick.kind[packed.index]
     position, rotation, joints = _target(packed, kind)
     rows = packed.rows
+    led = int(getattr(packed.task, "max_acceleration", None) is not None)
     return (
         f"{{{_text(packed.task.name)}, {rows.start}, {rows.stop - rows.start}, "
-        f"{position}, {rotation}, {joints}, {level}}}"
+        f"{position}, {rotation}, {joints}, {level}, {led}}}"
     )
 
 

@@ -1,8 +1,7 @@
 """Targets that are approached on ways (`max_acceleration`), of one robot, in the language of kernels.
 
-What `opspace.tasks.tracking` and `opspace.tasks.ways` do. A task that is on a way keeps a row for each
-of its coordinates, in its own axes: where the way began, and the motion that
-`opspace.law.swift_motion` has planned for one coordinate along the way or across it.
+What `opspace.tasks.tracking` does, and `opspace.kernels.led_goals` for one robot: here a target is
+another one where its numbers are others, and turns are quaternions.
 """
 
 from __future__ import annotations
@@ -11,6 +10,7 @@ import math
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from opspace.kernels import led_goals
 from opspace.kernels.columns import (
     FIRST_ROW,
     JOINTS,
@@ -24,21 +24,13 @@ from opspace.kernels.columns import (
 )
 from opspace.kernels.dynamics import evaluate
 from opspace.kernels.motion import P, R, measure, move_joints
+from opspace.kernels.swift_way import follow_way, plan_way, rates_of_turn
 from opspace.kernels.task_rows import _quaternion
-from opspace.law.swift_motion import swift_at, swift_motion, swift_time
+from opspace.law.way_columns import ACCELERATION, AWAY, BEGAN, SPEED
 
-BEGAN, SPEED, ACCELERATION, MIRROR, AWAY, PUSH, TOP, STAY, END = range(9)
-"""Columns of a coordinate that is on a way: its first value; its first speed and acceleration, along and
-across the way; the normal of the mirror between the task's axes and those; how far it goes, and how."""
-WAY_SIZE = 9
 TOLD, RATE, CURVATURE = 0, 7, 13
 """Where what a task of motion is told is kept: position and quaternion, their rate, its rate."""
 TOLD_SIZE = 19
-JERK_SHARE = 10.0
-"""Jerk over acceleration, one by `opspace.tasks.ways.JERK_TIME`, 1/s."""
-NO_MIRROR = 1e-30
-SERIES_BELOW = 1e-2
-"""Angle in rad below which series are more accurate than differences of near numbers."""
 
 
 def forget_way(work, robot, i):
@@ -223,57 +215,10 @@ def _follow_motion(work, robot, i, age):
     target[4] = w * x + a * u + b * z - c * y
     target[5] = w * y + b * u + c * x - a * z
     target[6] = w * z + c * u + a * y - b * x
-    _turning_rates(robot, i, place, turning)
-
-
-def _turning_rates(robot, i, place, at):
-    """ω = V φ̇ and ω̇ = V φ̈ + V̇ φ̇ (`opspace.tasks.rotation.turning_rates`) of rows 3 to 5."""
-    f = (place[3, 0], place[4, 0], place[5, 0])
-    g = (place[3, 1], place[4, 1], place[5, 1])
-    h = (place[3, 2], place[4, 2], place[5, 2])
-    square, growth = inner(f, f), inner(f, g)
-    angle = math.sqrt(square)
-    a, b = 0.5 - square / 24.0, 1.0 / 6.0 - square / 120.0
-    a_rate = growth * (-1.0 / 12.0 + square / 180.0)
-    b_rate = growth * (-1.0 / 60.0 + square / 1260.0)
-    if angle >= SERIES_BELOW:
-        sine, cosine = math.sin(angle), math.cos(angle)
-        a, b = (1.0 - cosine) / square, (angle - sine) / (square * angle)
-        a_rate = growth * (sine / angle - 2.0 * a) / square
-        b_rate = growth * (a - 3.0 * b) / square
-    once = outer(f, g)
-    bent = outer(f, h)
-    twice = outer(f, once)
-    far = outer(f, bent)
-    round_ = outer(g, once)
-    g0, g1, g2 = g
-    o0, o1, o2 = once
-    t0, t1, t2 = twice
-    h0, h1, h2 = h
-    n0, n1, n2 = bent
-    r0, r1, r2 = far
-    s0, s1, s2 = round_
-    omega, alpha = robot.velocity[i], robot.acceleration[i]
-    omega[at] = g0 + a * o0 + b * t0
-    omega[at + 1] = g1 + a * o1 + b * t1
-    omega[at + 2] = g2 + a * o2 + b * t2
-    alpha[at] = h0 + a * n0 + b * r0 + a_rate * o0 + b_rate * t0 + b * s0
-    alpha[at + 1] = h1 + a * n1 + b * r1 + a_rate * o1 + b_rate * t1 + b * s1
-    alpha[at + 2] = h2 + a * n2 + b * r2 + a_rate * o2 + b_rate * t2 + b * s2
-
-
-def inner(f, g):
-    """Product of two vectors."""
-    f0, f1, f2 = f
-    g0, g1, g2 = g
-    return f0 * g0 + f1 * g1 + f2 * g2
-
-
-def outer(f, g):
-    """Cross product of two vectors."""
-    f0, f1, f2 = f
-    g0, g1, g2 = g
-    return f1 * g2 - f2 * g1, f2 * g0 - f0 * g2, f0 * g1 - f1 * g0
+    rates_of_turn(place, 3)
+    for k in range(3):
+        robot.velocity[i, turning + k] = place[3 + k, 1]
+        robot.acceleration[i, turning + k] = place[3 + k, 2]
 
 
 def _lead_joints(work, robot, i):
@@ -337,61 +282,6 @@ def _begin_joints(work, robot, i, first, end):
     ways.led[i], ways.begins[i], ways.age[i] = 1, 1, 0.0
 
 
-def plan_way(way, first, size, speed, most):
-    """Plan a `opspace.tasks.ways.SwiftWay` of some coordinates from AWAY, SPEED and ACCELERATION."""
-    length = 0.0
-    for k in range(first, first + size):
-        length += way[k, AWAY] * way[k, AWAY]
-    length = math.sqrt(length)
-    square = 0.0
-    for k in range(first, first + size):
-        way[k, MIRROR] = way[k, AWAY] / length if length > 0.0 else 0.0
-        if k == first and length > 0.0:
-            way[k, MIRROR] -= 1.0
-        square += way[k, MIRROR] * way[k, MIRROR]
-    for k in range(first, first + size):
-        way[k, MIRROR] = way[k, MIRROR] * math.sqrt(2.0 / square) if square >= NO_MIRROR else 0.0
-    for column in (SPEED, ACCELERATION, AWAY):
-        mirror(way, way, first, size, column)
-        if size > 1 and square >= NO_MIRROR:
-            way[first + size - 1, column] *= -1.0
-    jerk = JERK_SHARE * most
-    for k in range(first, first + size):
-        v, a = way[k, SPEED], way[k, ACCELERATION]
-        way[k, PUSH], way[k, TOP], way[k, STAY] = swift_motion(
-            way[k, AWAY], v, a, speed, most, jerk
-        )
-        way[k, END] = swift_time(way[k, PUSH], way[k, TOP], way[k, STAY], v, a, most, jerk)
-
-
-def mirror(way, x, first, size, column):
-    """Mirror a column of x at the plane that lies between the first axis and the way."""
-    along = 0.0
-    for k in range(first, first + size):
-        along += way[k, MIRROR] * x[k, column]
-    for k in range(first, first + size):
-        x[k, column] -= along * way[k, MIRROR]
-
-
-def follow_way(way, place, first, size, age, most):
-    """Put position, speed and acceleration in the task's axes into the columns of place."""
-    mirrored = False
-    for k in range(first, first + size):
-        if way[k, MIRROR] != 0.0:
-            mirrored = True
-        x, v, a = way[k, AWAY], 0.0, 0.0
-        if age < way[k, END]:
-            x, v, a = swift_at(
-                age, way[k, PUSH], way[k, TOP], way[k, STAY], way[k, SPEED], way[k, ACCELERATION],
-                most, JERK_SHARE * most,
-            )  # fmt: skip
-        place[k, 0], place[k, 1], place[k, 2] = x, v, a
-    for column in range(3):
-        if mirrored and size > 1:
-            place[first + size - 1, column] *= -1.0
-        mirror(way, place, first, size, column)
-
-
 def forget_no_way(work, robot, i):
     """Be on no way."""
 
@@ -400,8 +290,15 @@ def lead_nowhere(work, robot):
     """Be on no way."""
 
 
+def led_already(t, work):
+    """Have targets where their ways are."""
+
+
 WITHOUT_WAYS: Mapping[Callable[..., Any], Callable[..., Any]] = {
     forget_way: forget_no_way,
     lead: lead_nowhere,
 }
 """What is called where no task has a max_acceleration, by what is called otherwise."""
+
+IN_TICK: Mapping[Callable[..., Any], Callable[..., Any]] = {led_goals.lead: led_already}
+"""The same of the tick, before which a fleet has led its tasks."""

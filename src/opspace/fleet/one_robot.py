@@ -40,8 +40,7 @@ from opspace.kernels.many_states import brake
 from opspace.kernels.motion import P, R, measure
 from opspace.kernels.task_rows import _quaternion
 from opspace.kernels.tick import tick
-from opspace.law.scalars import MOST_UNREST
-from opspace.tasks.way_round import LARGEST_STEP
+from opspace.law.scalars import LARGEST_STEP, MOST_UNREST
 
 FAULT = int(Status.FAULT)
 SAME_TARGET = math.cos(LARGEST_STEP)

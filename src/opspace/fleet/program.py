@@ -13,7 +13,7 @@ from opspace.fleet.fleet_kernel import fleet_kernel
 from opspace.fleet.given_motion import INSTEAD
 from opspace.fleet.kernels_in_cpp import translate
 from opspace.fleet.layout import LANES, RobotLayout
-from opspace.fleet.led_targets import WITHOUT_WAYS
+from opspace.fleet.led_targets import IN_TICK, WITHOUT_WAYS
 from opspace.fleet.no_integrals import WITHOUT
 from opspace.fleet.one_robot import robot_tick
 from opspace.fleet.precision import constants_of
@@ -52,6 +52,7 @@ ROLLED = {"cpu": '_Pragma("clang loop unroll(disable)")', "cuda": '_Pragma("unro
 EXACT = (
     *(f"opspace.kernels.{name}" for name in ("dynamics", "projection", "room_below")),
     "opspace.law.swift_motion",
+    "opspace.kernels.swift_way",
     "opspace.fleet.led_targets",
 )
 """Modules that count with sixteen digits in every fleet, as `opspace.fleet.layout.DIGITS` do."""
@@ -242,7 +243,7 @@ def _row(array: str) -> str:
 
 @cache
 def _translated(dtype: str, given: bool, integrates: bool, paced: bool) -> tuple[str, str]:
-    instead = {**(INSTEAD if given else {}), **({} if integrates else WITHOUT)}
+    instead = {**IN_TICK, **(INSTEAD if given else {}), **({} if integrates else WITHOUT)}
     if not paced:
         instead |= WITHOUT_WAYS
     if dtype == "float32":

@@ -6,7 +6,8 @@ from functools import partial
 
 import numpy as np
 
-from opspace.fleet.led_targets import TOLD_SIZE, WAY_SIZE
+from opspace.fleet.led_targets import TOLD_SIZE
+from opspace.law.way_columns import WAY_SIZE
 from opspace.machine.field_table import Field, RecordTable
 
 _given = partial(Field, writer="caller")

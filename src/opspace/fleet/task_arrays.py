@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from opspace.errors import InputError
-from opspace.fleet.led_targets import TOLD_SIZE, WAY_SIZE
+from opspace.fleet.led_targets import TOLD_SIZE
 from opspace.fleet.told_arrays import ToldArrays, write_rows
 from opspace.fleet.warp_library import robots_of, warp
 from opspace.kernels.columns import (
@@ -24,6 +24,7 @@ from opspace.kernels.columns import (
     QUANTITY,
     SPRING,
 )
+from opspace.law.way_columns import WAY_SIZE
 from opspace.machine.field_table import Record
 from opspace.tasks import ImpedanceTask, TrackingTask
 from opspace.tasks.rotation import quaternion_from_matrix

@@ -2,23 +2,23 @@
 
 from __future__ import annotations
 
-from types import FunctionType
+from types import FunctionType, ModuleType
 from typing import Any
 
 from opspace.law import scalars
 from opspace.machine.jit import jit
 
 
-def _compiled() -> dict[str, Any]:
-    """Compile every function, with a namespace in which those before it are compiled already."""
-    names = dict(vars(scalars))
-    for name, function in vars(scalars).items():
-        if isinstance(function, FunctionType) and function.__module__ == scalars.__name__:
+def compiled(module: ModuleType) -> dict[str, Any]:
+    """Compile every function of a module, with a namespace in which all of them are compiled."""
+    names = dict(vars(module))
+    for name, function in vars(module).items():
+        if isinstance(function, FunctionType) and function.__module__ == module.__name__:
             names[name] = jit(FunctionType(function.__code__, names, name))
     return names
 
 
-_COMPILED = _compiled()
+_COMPILED = compiled(scalars)
 
 profile = _COMPILED["profile"]
 fade = _COMPILED["fade"]

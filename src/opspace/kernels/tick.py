@@ -45,6 +45,7 @@ from opspace.kernels.inertia import (
     whiten_rows,
     whitened_of,
 )
+from opspace.kernels.led_goals import lead
 from opspace.kernels.level import project, solve_level, take_alternative
 from opspace.kernels.limit_columns import COMMAND, SIGN
 from opspace.kernels.limit_rows import begin_limits, insert_limits, keep_bounds
@@ -79,6 +80,7 @@ def tick(t, work):
         evaluate(work.bodies, work.q, work.v, work.dynamics)
     if not factor(work.M, work.inertia):
         return NOT_POSITIVE_DEFINITE
+    lead(t, work)
     moved = press(t, work)
     activations(t, work)
     evaluate_tasks(work, moved)

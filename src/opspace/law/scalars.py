@@ -516,6 +516,9 @@ FOLLOWED = math.cos(0.5 * 1.0)
 """A rotation that differs by more than 1 rad from the one before is no motion but a new target or a
 new state, and takes the short way."""
 
+LARGEST_STEP = 0.05
+"""A target that moves by more than this from one tick to the next, rad, is another target: a reference
+at 1 kHz moves by thousandths of it, and one that a person assigns anew by far more."""
 
 SIGNS = 48
 """Signs that are remembered as the bits of one whole number, exact as a floating-point number, too."""

@@ -11,6 +11,8 @@ from __future__ import annotations
 
 import math
 
+JERK_SHARE = 10.0
+"""Jerk over acceleration of ways, 1/s: they reach their largest acceleration in 0.1 s."""
 ROOT_STEPS = 200
 """A root is found to the last digits in a dozen steps; no more than these are taken."""
 ROUNDING, TINIEST = 4e-16, 1e-300

@@ -13,6 +13,7 @@ from opspace.machine.field_table import Block, Record
 from opspace.plan.bound_records import BOUNDS
 from opspace.plan.contact_records import no_stance
 from opspace.plan.distance_records import DISTANCES
+from opspace.plan.led_records import LED
 from opspace.plan.records import INERTIA, SPACE, TICK
 from opspace.robots.motion_axes import MotionAxes
 from opspace.robots.motor_range import MotorRange
@@ -36,6 +37,8 @@ class Sizes(NamedTuple):
     distances: int = 0
     contacts: int = 0
     presses: int = 0
+    led: int = 0
+    led_rows: int = 0
 
     def by_name(self) -> dict[str, int]:
         """Return them as the tables of `opspace.plan.records` take them."""
@@ -123,6 +126,7 @@ def make_tick(
         "later_inertia": make_inertia(_before(axes)),
         "bounds": BOUNDS.make(sizes),
         "distances": DISTANCES.make(sizes),
+        "led": LED.make(sizes),
         "stance": no_stance() if stance is None else stance,
     }
     return TICK.make(sizes, {**kept, **given}), block.memory

@@ -49,9 +49,11 @@ from opspace.kernels.columns import (
     TURN,
     WORLD,
 )
+from opspace.kernels.led_columns import FROM_FOLLOWED, FROM_FOUND
 from opspace.law.scalars import SIGNS
 from opspace.machine.field_table import Record
 from opspace.plan.pack_contact import Activation, activated
+from opspace.plan.pack_led import LedGoal
 from opspace.robots.adapter import AdapterBase
 from opspace.robots.motion_axes import FramePlace, MotionAxes
 from opspace.stack import Member
@@ -67,6 +69,7 @@ from opspace.tasks.quantities import Orientation, Pose, Position
 from opspace.tasks.references import Sample
 from opspace.tasks.tracking import Hold, TrackingTask
 from opspace.tasks.way_round import WayRound
+from opspace.tasks.ways import Way
 
 QUANTITIES = {Position: POSITION, Orientation: ORIENTATION, Pose: POSE}
 SOURCES = {WorldFrame: WORLD, RelativeFrame: RELATIVE, CenterOfMass: CENTRE_OF_MASS}
@@ -206,6 +209,9 @@ class Packed:
         self.turn = tick.numbers[index, TURN : TURN + 4].data
         self.way_round: WayRound | None = None
         self._turning = np.zeros(0)
+        self.led: LedGoal | None = None
+        if code in (MOTION, JOINTS) and tick.led.pace.size:
+            self.led = LedGoal(self.task, index, self.rows, tick)
         self._take_activation()
         if kind[KIND] == MOTION:
             self._pack_source(axes)
@@ -274,7 +280,18 @@ class Packed:
             or task._target is not self.target
             or task._held is not self.held
             or task._gains is not self.gains
+            or (self._is_led and task.way is not self._way)
         )
+
+    @property
+    def _is_led(self) -> bool:
+        """Whether compiled code leads the task to its targets."""
+        return self.led is not None and self.task._gains.max_acceleration is not None
+
+    @property
+    def _way(self) -> Way | None:
+        """The way that compiled code follows."""
+        return None if self.led is None else self.led.way
 
     @property
     def settled(self) -> bool:
@@ -296,7 +313,7 @@ class Packed:
             return  # none is remembered, or it is there already
         if before is None or before.way_round is None:
             self.remembers[0] = 0
-        elif self._timed or before._timed or not self._agrees(before):
+        elif self._timed or before._timed or self._is_led or not self._agrees(before):
             self._go_on(before.remembers[0], before.turn, before._turning)
         else:  # on the way to the same goal
             self.remembers[0] = before.remembers[0]
@@ -362,11 +379,14 @@ class Packed:
 
     def _pack_ahead(self) -> None:
         """Pack what is known before the tick, from any thread; `refresh` sees what changes later."""
-        if getattr(self.task, "ki", None) is None:
+        if getattr(self.task, "ki", None) is None and not self._is_led:
             self.pack_value()
 
     def pack_value(self) -> None:
-        """Pack a target that stays what it is, without what an integral adds; no other one."""
+        """Pack a target that stays what it is, without what an integral adds; no other one.
+
+        A task that is led to it begins where it finds the robot, as one that has followed nothing yet.
+        """
         task = self.task
         if self.own_kind or type(task).desired is not TrackingTask.desired:
             return
@@ -376,13 +396,22 @@ class Packed:
             if held is None or held[0] is not goal:
                 return
             goal = held[1]
-        elif callable(goal) or task._gains.max_acceleration is not None:
+        elif callable(goal):
+            return
+        elif task._gains.max_acceleration is not None and not target.velocity.any():
+            if self.led is not None:
+                self._pack_gains(task._gains)
+                self.led.ask(target, FROM_FOUND)
+                self.target, self.held, self._timed = target, held, False
             return
         sample = Sample(goal, target.velocity, target.acceleration)
         self._write(sample, target, held, task._gains)
 
     def _pack(self, robot: AdapterBase, t: float) -> None:
         task = self.task
+        if self.led is not None and task._gains.max_acceleration is not None:
+            self._lead(robot, t, self.led)
+            return
         target = task._target
         if not self._timed:  # it may hold what it finds
             robot.check_state(robot.q, robot.v)
@@ -390,17 +419,50 @@ class Packed:
         desired = task.pushed(task.desired(robot, t))
         self._write(desired, target, task._held, gains)
         self._timed = task.moves(t)
+        if self.led is not None:
+            self.led.leave()
+
+    def _lead(self, robot: AdapterBase, t: float, led: LedGoal) -> None:
+        """Pack a task whose ways compiled code plans and follows."""
+        task = self.task
+        target, gains = task._target, task._gains
+        led.push(task.integral)
+        same = target is self.target and gains is self.gains
+        if same and led.way is not None and task.way is led.way:
+            return
+        self._pack_gains(gains)
+        robot.check_state(robot.q, robot.v)  # it may hold what it finds
+        if task.approaches(target):
+            self._ask(robot, t, target, led)
+        else:
+            desired = task.desired(robot, t)
+            if task.way is not None:
+                led.load(task.way)
+            else:
+                led.leave()
+                self._write(task.pushed(desired), target, task._held, gains)
+        self.target, self.held, self.gains = target, task._held, gains
+        self._timed = task.ki is not None or callable(target.goal)
+
+    def _ask(self, robot: AdapterBase, t: float, target: Any, led: LedGoal) -> None:
+        """Have a way begin with what is followed until now, or else with what is found."""
+        task = self.task
+        followed, start = None, FROM_FOLLOWED
+        if task.way is not None:
+            led.load(task.way)
+        else:
+            led.leave()
+            followed = task.followed_before(robot, t)
+            if followed is None:
+                start = FROM_FOUND
+            else:
+                self._write(followed, target, task._held, task._gains)
+        led.ask(target, start)
 
     def _write(self, desired: Any, target: Any, held: object, gains: Any) -> None:
         tick, rows = self._tick, self.rows
         before = self._turning.copy() if self.remembers[0] else None
-        if gains is not self.gains:
-            tick.kp[rows], tick.kv[rows] = gains.kp, gains.kv
-            limited = gains.max_speed is not None
-            tick.kind[self.index, SPEED_LIMITED] = int(limited)
-            if limited:
-                most = slice(MAX_SPEED, MAX_SPEED + len(gains.max_speed))
-                tick.numbers[self.index, most] = gains.max_speed
+        self._pack_gains(gains)
         if self.joints:
             tick.goal[rows, 0], tick.goal[rows, 1], tick.goal[rows, 2] = desired
         else:
@@ -408,7 +470,20 @@ class Packed:
         way = self.way_round
         if before is not None and way is not None and way.jumps(before, self._turning):
             self.forget()
-        self.target, self.held, self.gains = target, held, gains
+        self.target, self.held = target, held
+
+    def _pack_gains(self, gains: Any) -> None:
+        tick, rows = self._tick, self.rows
+        if gains is not self.gains:
+            tick.kp[rows], tick.kv[rows] = gains.kp, gains.kv
+            limited = gains.max_speed is not None
+            tick.kind[self.index, SPEED_LIMITED] = int(limited)
+            if limited:
+                most = slice(MAX_SPEED, MAX_SPEED + len(gains.max_speed))
+                tick.numbers[self.index, most] = gains.max_speed
+            if self.led is not None:
+                self.led.set_pace(gains)
+            self.gains = gains
 
     def _pack_goal(self, desired: Any) -> None:
         number, quantity = self._tick.numbers[self.index], self._tick.kind[self.index, QUANTITY]

@@ -91,6 +91,8 @@ class Plan:
         blending: How activations are blended.
         guard: What is kept apart, or None.
         contacts: What the robot touches, or None where it is bolted down.
+        leads: Whether the tick itself leads tasks to their targets on ways; otherwise that is done by
+            whoever refreshes the plan.
     """
 
     def __init__(
@@ -104,6 +106,8 @@ class Plan:
         blending: Blending,
         guard: CollisionAvoidance | None = None,
         contacts: PackedContacts | None = None,
+        *,
+        leads: bool = False,
     ) -> None:
         self.members = members
         self.structure = structure(members)
@@ -119,10 +123,11 @@ class Plan:
         last = CHANGES.last
         layout = None if guard is None else guard.layout()
         presses = presses_of(members)
+        rows = sum(member.task.rows for member in members)
         self.size = Sizes(
             n=axes.v.size,
             tasks=len(members),
-            rows=sum(member.task.rows for member in members),
+            rows=rows,
             slot_rows=sum(members[i].task.rows for _, i, _ in self.places),
             slots=len(self.places),
             levels=len(self.levels),
@@ -135,6 +140,8 @@ class Plan:
             distances=0 if layout is None else len(layout.rows),
             contacts=0 if contacts is None else contacts.most,
             presses=len(presses),
+            led=len(members) if leads else 0,
+            led_rows=rows if leads else 0,
         )
         self.contacts = contacts
         stance = None if contacts is None else contacts.record
@@ -146,6 +153,7 @@ class Plan:
             self.distances = PackedDistances(guard, layout, axes, self.tick)
         # Where everything is known ahead, the first tick need not look.
         self.moving = False
+        self.asks = False  # for ways, of the next tick
         self.seen: object = None
         if guard is None and all(packed.settled for packed in self.packed):
             self.seen = last
@@ -155,8 +163,8 @@ class Plan:
         self._ramps[:] = b"".join([_packed(variable.ramp) for variable in self.variables])
         self._pack_slots()
         self.first_kept = self.tick.space.first_kept
-        depth, rows = self.tick.slots[:, 0], self.tick.slots[:, 2]
-        self.first_kept[:] = [rows[depth < d].sum() for d in range(self.first_kept.size)]
+        depth, counts = self.tick.slots[:, 0], self.tick.slots[:, 2]
+        self.first_kept[:] = [counts[depth < d].sum() for d in range(self.first_kept.size)]
         if limits is not None:
             _pack_limits(limits, scales, self.tick)
         self.handle = self.tick.handle()
@@ -193,7 +201,15 @@ class Plan:
             self.distances.refresh(t)
         self.moving = any(packed.moving for packed in self.packed)
         self.moving |= self.distances is not None and self.distances.moving
+        self.asks = self._asks()
         self.seen = last
+
+    def note_ways(self) -> None:
+        """Let tasks know the ways that the tick has begun."""
+        for packed in self.packed:
+            if packed.led is not None:
+                packed.led.note()
+        self.asks = self._asks()
 
     def disturb(self, acceleration: np.ndarray) -> None:
         """Tell the joint limits what comes on top of the commanded accelerations, (n,) rad/s²."""
@@ -307,6 +323,9 @@ class Plan:
             rows = packed.rows
             self.tick.row_unrest[rows] = unrest.of(presence, rows.stop - rows.start)
         self.seen = None
+
+    def _asks(self) -> bool:
+        return any(packed.led is not None and packed.led.asked for packed in self.packed)
 
     def _pack(self, scales: Scales, presses: Mapping[int, int]) -> list[Packed]:
         packed: list[Packed] = []

@@ -21,6 +21,7 @@ from opspace.plan.contact_records import STANCE
 from opspace.plan.cycle_records import CYCLES
 from opspace.plan.distance_records import DISTANCES
 from opspace.plan.integral_records import INTEGRALS
+from opspace.plan.led_records import LED
 from opspace.plan.quiet_records import QUIET
 from opspace.robots.bodies import DYNAMICS, RIGID_BODIES
 
@@ -42,6 +43,8 @@ SIZES = {
     "distances": "pairs of a ball and a set",
     "contacts": "contacts that can be there at once, none of a robot that is bolted down",
     "presses": "force tasks",
+    "led": "tasks, where the tick leads them to their targets on ways, else 0",
+    "led_rows": "rows of all tasks there",
     "corners": "corners that the blend can have",
     "widest": "the largest of rows + limits, n and 6 contacts, at least one",
     "states": "states of a batch",
@@ -232,6 +235,7 @@ TICK = RecordTable(
     _record("bounds", of=BOUNDS),
     _record("distances", of=DISTANCES),
     _record("stance", of=STANCE),
+    _record("led", of=LED),
 )
 
 
@@ -277,6 +281,7 @@ TABLES = (
     BOUNDS,
     DISTANCES,
     STANCE,
+    LED,
     RIGID_BODIES,
     DYNAMICS,
     STATES,

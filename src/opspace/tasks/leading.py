@@ -59,11 +59,11 @@ def lead(
     now, quantity = task.desired(robot, t), task.quantity
     if isinstance(quantity, Pose):
         goal = _goal(task, now, position, orientation)
-        task.target = PoseWay(now, goal, t, MOVING, TURNING)
+        task.target = PoseWay.to(now, goal, t, MOVING, TURNING)
     elif isinstance(quantity, Position) and position is not None and orientation is None:
-        task.target = VectorWay(now, finite_array(position, (3,), _goal_of(task)), t, MOVING)
+        task.target = VectorWay.to(now, finite_array(position, (3,), _goal_of(task)), t, MOVING)
     elif isinstance(quantity, Orientation) and orientation is not None and position is None:
-        task.target = RotationWay(now, as_rotation(orientation, _goal_of(task)), t, TURNING)
+        task.target = RotationWay.to(now, as_rotation(orientation, _goal_of(task)), t, TURNING)
     else:
         takes = "a position" if isinstance(quantity, Position) else "an orientation"
         raise InputError(f"task {task.name!r} is led to {takes} and nothing else")

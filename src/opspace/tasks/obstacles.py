@@ -191,7 +191,7 @@ class Obstacle:
         now = Sample(here.position, here.velocity[:3], _NONE)
         if isinstance(path, VectorWay):
             now = path(t)
-        self.place(VectorWay(now, end, t, LED))
+        self.place(VectorWay.to(now, end, t, LED))
 
     def put_back(self, placing: Placing) -> None:
         """Let it be exactly so, to the last bit, whatever it follows.

@@ -132,7 +132,7 @@ class PostureTask(TrackingTask):
             )
         way = goal - now.x
         way[layout.endless] = [math.remainder(x, 2.0 * math.pi) for x in way[layout.endless]]
-        return VectorWay(now, now.x + way, t, self._pace())
+        return VectorWay.to(now, now.x + way, t, self._pace())
 
     def _recheck(self) -> None:
         """Check again what was given before the robot was known."""

@@ -72,7 +72,7 @@ class Position:
 
     def way(self, now: Sample, goal: Array, t: float, paces: Sequence[Pace]) -> Way:
         """Return the straight way."""
-        return VectorWay(now, goal, t, paces[0])
+        return VectorWay.to(now, goal, t, paces[0])
 
     def reset(self) -> None:
         """Do nothing: a position has no past."""
@@ -106,7 +106,7 @@ class Orientation:
 
     def way(self, now: Sample, goal: Array, t: float, paces: Sequence[Pace]) -> Way:
         """Return the turn about one axis."""
-        return RotationWay(now, goal, t, paces[0])
+        return RotationWay.to(now, goal, t, paces[0])
 
     def reset(self) -> None:
         """Forget which way round the error went."""
@@ -139,7 +139,7 @@ class Pose:
 
     def way(self, now: Sample, goal: Array, t: float, paces: Sequence[Pace]) -> Way:
         """Return both ways."""
-        return PoseWay(now, goal, t, *paces)
+        return PoseWay.to(now, goal, t, *paces)
 
     def reset(self) -> None:
         """Forget which way round the rotation error went."""

@@ -330,12 +330,46 @@ class TrackingTask(Task):
         target = self._target  # read once: another thread may replace it during this tick
         if self._gains.max_acceleration is None:
             return self._followed_at(target, t, current)
-        before = self._before
-        if target is not before:
-            if isinstance(target.goal, np.ndarray) and not target.velocity.any():
-                self._lead(before, target, target.goal, t, current)
+        if self.approaches(target):
+            assert isinstance(target.goal, np.ndarray)
+            rest, before = self._vector(None, ""), self._before
+            if before is None:
+                now = Sample(current().copy(), rest, rest)
+            else:
+                now = self._followed_at(before, t, current)
+            self.go_on(target, self._way(now, target.goal, t))
+        if target is not self._before:
             self._before = target
         return self._followed_at(target, t, current)
+
+    def approaches(self, target: Target) -> bool:
+        """Tell whether a way to a target is to begin; one to the same value, as streamed, goes on."""
+        before, led, goal = self._before, self._led, target.goal
+        if target is before or not isinstance(goal, np.ndarray) or target.velocity.any():
+            return False
+        known = None if before is None else before.goal
+        same = isinstance(known, np.ndarray) and np.array_equal(known, goal)
+        if same and led is not None and led.target is before:
+            self.go_on(target, led.way)
+            return False
+        return True
+
+    def go_on(self, target: Target, way: Way) -> None:
+        """Be on a way to a target."""
+        self._led, self._before = Led(target, way), target
+
+    @property
+    def way(self) -> Way | None:
+        """The way that it is on, or has come to the end of; None where it follows what it is told."""
+        led = self._led
+        return led.way if led is not None and led.target is self._before else None
+
+    def followed_before(self, robot: Robot, t: float) -> Sample | None:
+        """Return what has been followed until time ``t`` [s]; None where nothing has."""
+        before = self._before
+        if before is None:
+            return None
+        return self._followed_at(before, t, lambda: self._current(robot))
 
     def _followed_at(self, target: Target, t: float, current: Callable[[], Array]) -> Sample:
         """Return what a target means at time t: what is held, referred to, approached or given."""
@@ -350,28 +384,6 @@ class TrackingTask(Task):
         elif self._led is not None and self._led.target is target:
             return self._led.way(t)
         return Sample(goal, target.velocity, target.acceleration)
-
-    def _lead(
-        self,
-        before: Target | None,
-        target: Target,
-        goal: Array,
-        t: float,
-        current: Callable[[], Array],
-    ) -> None:
-        """Begin the way to a value, from what is followed until now or else from what is found."""
-        led, known = self._led, None if before is None else before.goal
-        repeated = isinstance(known, np.ndarray) and np.array_equal(known, goal)
-        if repeated and led is not None and led.target is before:
-            self._led = Led(target, led.way)  # the same again, as of a value that is streamed
-            return
-        rest = self._vector(None, "")
-        now = (
-            Sample(current().copy(), rest, rest)
-            if before is None
-            else self._followed_at(before, t, current)
-        )
-        self._led = Led(target, self._way(now, goal, t))
 
     def moves(self, t: float) -> bool:
         """Tell whether what is desired changes after time ``t`` [s] without anything being assigned."""
@@ -389,7 +401,7 @@ class TrackingTask(Task):
 
     def _way(self, now: Sample, goal: Array, t: float) -> Way:
         """Make the way from what is followed at time t to a value, which is in the task's own form."""
-        return VectorWay(now, goal, t, self._pace())
+        return VectorWay.to(now, goal, t, self._pace())
 
     def _sampled(self, target: Target, reference: Reference, t: float) -> Sample:
         what = f"task {self.name!r}: reference at t = {t:.6g} s:"

@@ -7,12 +7,8 @@ from abc import ABC, abstractmethod
 
 import numpy as np
 
-from opspace.law.scalars import SIGNS, without_turns
+from opspace.law.scalars import LARGEST_STEP, SIGNS, without_turns
 from opspace.tasks.validation import Array
-
-LARGEST_STEP = 0.05
-"""A target that moves by more than this from one tick to the next, rad, is another target: a reference
-at 1 kHz moves by thousandths of it, and one that a person assigns anew by far more."""
 
 Remembered = tuple[float, float, float, float]
 

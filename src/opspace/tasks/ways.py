@@ -2,16 +2,30 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from opspace.law.swift_motion import swift_at, swift_motion, swift_time
+from opspace.law.swift_motion import JERK_SHARE, swift_at, swift_motion, swift_time
+from opspace.law.way_columns import (
+    ACCELERATION,
+    AWAY,
+    BEGAN,
+    END,
+    MIRROR,
+    NO_MIRROR,
+    PUSH,
+    SPEED,
+    STAY,
+    TOP,
+    WAY_SIZE,
+)
 from opspace.tasks.references import PoseReference, Sample
-from opspace.tasks.rotation import exp_rotation, log_rotation, turning_rates
+from opspace.tasks.rotation import exp_rotation, homogeneous, log_rotation, turning_rates
 from opspace.tasks.validation import Array
 
-JERK_TIME = 0.1
+JERK_TIME = 1.0 / JERK_SHARE
 """Time in which a way reaches its largest acceleration, s."""
 
 
@@ -47,31 +61,58 @@ class SwiftWay:
     The first coordinate is along the vector, the others across it; these only come to rest.
 
     Args:
-        way: (k,) where it goes.
-        velocity: (k,) at its beginning.
-        acceleration: (k,) at its beginning.
-        pace: Its limits.
+        rows: (k, WAY_SIZE) what is planned for each, see `opspace.law.way_columns`; compiled code keeps
+            the same.
+        most: Its largest acceleration.
 
     Attributes:
+        rows: The same.
+        most: The same.
         duration: How long it takes, s.
     """
 
-    def __init__(self, way: Array, velocity: Array, acceleration: Array, pace: Pace) -> None:
-        self._axes = _axes_along(way)
-        self._limits = most, jerk = pace.acceleration, pace.acceleration / JERK_TIME
-        self._parts: list[tuple[float, float, float, float, float]] = []
-        self._ends: list[tuple[float, float]] = []
-        for d, v, a in (np.stack((way, velocity, acceleration), axis=1).T @ self._axes).T.tolist():
-            plan = swift_motion(d, v, a, pace.speed, most, jerk)
-            self._parts.append((*plan, v, a))
-            self._ends.append((swift_time(*plan, v, a, most, jerk), d))
-        self.duration = max(end for end, _ in self._ends)
+    def __init__(self, rows: Array, most: float) -> None:
+        self.rows, self.most = rows, most
+        normal = rows[:, MIRROR]
+        self._axes = np.eye(len(rows)) - np.outer(normal, normal)
+        if normal.any() and len(rows) > 1:
+            self._axes[:, -1] *= -1.0  # a reflection otherwise
+        self._parts: list[list[float]] = rows.tolist()
+        self.duration = max(part[END] for part in self._parts)
+
+    @classmethod
+    def planned(cls, way: Array, velocity: Array, acceleration: Array, pace: Pace) -> SwiftWay:
+        """Plan a way.
+
+        Args:
+            way: (k,) where it goes.
+            velocity: (k,) at its beginning.
+            acceleration: (k,) at its beginning.
+            pace: Its limits.
+        """
+        rows = np.zeros((way.size, WAY_SIZE))
+        rows[:, MIRROR] = _mirror_to(way)
+        axes = cls(rows, pace.acceleration)._axes
+        for column, x in ((AWAY, way), (SPEED, velocity), (ACCELERATION, acceleration)):
+            rows[:, column] = x @ axes
+        limits = pace.acceleration, JERK_SHARE * pace.acceleration
+        for row in rows:
+            d, v, a = row[[AWAY, SPEED, ACCELERATION]].tolist()
+            plan = swift_motion(d, v, a, pace.speed, *limits)
+            row[[PUSH, TOP, STAY]] = plan
+            row[END] = swift_time(*plan, v, a, *limits)
+        return cls(rows, pace.acceleration)
 
     def __call__(self, elapsed: float) -> Sample:
         """Return position, velocity and acceleration a time after its beginning, s."""
+        limits = self.most, JERK_SHARE * self.most
         found = [
-            swift_at(elapsed, *parts, *self._limits) if elapsed < end else (d, 0.0, 0.0)
-            for parts, (end, d) in zip(self._parts, self._ends, strict=True)
+            swift_at(
+                elapsed, row[PUSH], row[TOP], row[STAY], row[SPEED], row[ACCELERATION], *limits
+            )
+            if elapsed < row[END]
+            else (row[AWAY], 0.0, 0.0)
+            for row in self._parts
         ]
         return Sample(*(self._axes @ np.array(found)).T)
 
@@ -80,81 +121,91 @@ class VectorWay:
     """Goes to a value, with the limits along the straight way and across it.
 
     Args:
-        now: What is followed at its beginning, (k,) each.
+        motion: How it goes, with what is followed at its beginning.
         goal: (k,) where it goes.
-        t: Time at which it begins, s.
-        pace: Its limits.
+        begin: Time at which it begins, s.
     """
 
-    def __init__(self, now: Sample, goal: Array, t: float, pace: Pace) -> None:
-        self._start, self.goal, self._begin = now.x, goal, t
-        self._motion = SwiftWay(goal - now.x, now.v, now.a, pace)
-        self.end = t + self._motion.duration
+    def __init__(self, motion: SwiftWay, goal: Array, begin: float) -> None:
+        self.motion, self.goal, self.begin = motion, goal, begin
+        self._start = motion.rows[:, BEGAN].copy()
+        self.end = begin + motion.duration
+
+    @classmethod
+    def to(cls, now: Sample, goal: Array, t: float, pace: Pace) -> VectorWay:
+        """Plan the way from what is followed at time t [s], (k,) each, to a goal (k,)."""
+        motion = SwiftWay.planned(goal - now.x, now.v, now.a, pace)
+        motion.rows[:, BEGAN] = now.x
+        return cls(motion, goal, t)
 
     def __call__(self, t: float, /) -> Sample:
         """Return the desired motion at time t, s."""
         if t >= self.end:
             return Sample(self.goal, np.zeros(self.goal.size), np.zeros(self.goal.size))
-        x, v, a = self._motion(t - self._begin)
+        x, v, a = self.motion(t - self.begin)
         return Sample(self._start + x, v, a)
 
 
 class RotationWay:
-    """Turns to an orientation the short way: R = exp([φ(t)]×) R_now, with φ on a `SwiftWay`.
+    """Turns to an orientation the short way: R = exp([φ(t)]×) R_start, with φ on a `SwiftWay`.
 
     Args:
-        now: What is followed at its beginning: (3, 3) rotation matrix, (3,) and (3,) rates.
+        motion: How it turns.
+        start: (3, 3) orientation at its beginning.
         goal: (3, 3) where it turns to.
-        t: Time at which it begins, s.
-        pace: Its limits.
+        begin: Time at which it begins, s.
     """
 
-    def __init__(self, now: Sample, goal: Array, t: float, pace: Pace) -> None:
-        self._start, self.goal, self._begin = now.x, goal, t
-        self._turn = SwiftWay(log_rotation(goal @ now.x.T), now.v, now.a, pace)
-        self.end = t + self._turn.duration
+    def __init__(self, motion: SwiftWay, start: Array, goal: Array, begin: float) -> None:
+        self.motion, self.start, self.goal, self.begin = motion, start, goal, begin
+        self.end = begin + motion.duration
+
+    @classmethod
+    def to(cls, now: Sample, goal: Array, t: float, pace: Pace) -> RotationWay:
+        """Plan the turn from what is followed at time t [s], (3, 3) and (3,) rates, to a goal (3, 3)."""
+        motion = SwiftWay.planned(log_rotation(goal @ now.x.T), now.v, now.a, pace)
+        return cls(motion, now.x, goal, t)
 
     def __call__(self, t: float, /) -> Sample:
         """Return the desired motion at time t, s."""
         if t >= self.end:
             return Sample(self.goal, np.zeros(3), np.zeros(3))
-        phi, rate, curvature = self._turn(t - self._begin)
+        phi, rate, curvature = self.motion(t - self.begin)
         omega, alpha = turning_rates(phi, rate, curvature)
-        return Sample(exp_rotation(phi) @ self._start, omega, alpha)
+        return Sample(exp_rotation(phi) @ self.start, omega, alpha)
 
 
 class PoseWay(PoseReference):
     """Goes to a pose: its position and its orientation each on a way of its own.
 
     Args:
-        now: What is followed at its beginning: (4, 4) pose, (6,) and (6,) rates.
-        goal: (4, 4) where it goes.
-        t: Time at which it begins, s.
-        linear: Limits of the position.
-        angular: Limits of the orientation.
+        place: The way of the position.
+        turn: That of the orientation.
     """
 
-    def __init__(self, now: Sample, goal: Array, t: float, linear: Pace, angular: Pace) -> None:
+    def __init__(self, place: VectorWay, turn: RotationWay) -> None:
+        super().__init__(place, turn)
+        self.place, self.turn = place, turn
+        self.goal = homogeneous(place.goal, turn.goal)
+        self.end = max(place.end, turn.end)
+
+    @classmethod
+    def to(cls, now: Sample, goal: Array, t: float, linear: Pace, angular: Pace) -> PoseWay:
+        """Plan both ways from what is followed at time t [s], (4, 4) and rates, to a goal (4, 4)."""
         place = Sample(now.x[:3, 3], now.v[:3], now.a[:3])
         turn = Sample(now.x[:3, :3], now.v[3:], now.a[3:])
-        position = VectorWay(place, goal[:3, 3], t, linear)
-        orientation = RotationWay(turn, goal[:3, :3], t, angular)
-        super().__init__(position, orientation)
-        self.goal = goal
-        self.end = max(position.end, orientation.end)
+        return cls(
+            VectorWay.to(place, goal[:3, 3], t, linear),
+            RotationWay.to(turn, goal[:3, :3], t, angular),
+        )
 
 
-def _axes_along(way: Array) -> Array:
-    """Return a rotation (k, k) whose first column points along a vector (k,)."""
-    axes = np.eye(way.size)
+def _mirror_to(way: Array) -> Array:
+    """Return the normal, of length √2 or none, of the mirror from the first axis to a vector (k,)."""
     length = float(np.linalg.norm(way))
     if length == 0.0:
-        return axes
-    normal = way / length - axes[0]
+        return np.zeros(way.size)
+    normal = way / length
+    normal[0] -= 1.0
     square = float(normal @ normal)
-    if square < 1e-30:
-        return axes
-    axes -= 2.0 / square * np.outer(normal, normal)
-    if way.size > 1:
-        axes[:, -1] *= -1.0  # a reflection otherwise
-    return axes
+    return np.zeros(way.size) if square < NO_MIRROR else normal * math.sqrt(2.0 / square)

@@ -68,6 +68,12 @@ static void find_fields(opspace *c)
     c->slot_off = memory_of(c, "slot_off");
     c->slot_place = memory_of(c, "slot_place");
     c->first_kept = memory_of(c, "space.first_kept");
+    c->ways.goal = memory_of(c, "led.goal");
+    c->ways.joint_goal = memory_of(c, "led.joint_goal");
+    c->ways.more = memory_of(c, "led.more");
+    c->ways.joint_more = memory_of(c, "led.joint_more");
+    c->ways.asked = memory_of(c, "led.asked");
+    c->ways.on = memory_of(c, "led.on");
     c->sums.ki = memory_of(c, "integrals.ki");
     c->sums.motion = memory_of(c, "integrals.integral");
     c->sums.joint = memory_of(c, "integrals.joint_integral");
@@ -126,7 +132,8 @@ opspace *opspace_open(const opspace_model *model)
     c->words = take_memory(model);
     c->state = calloc((size_t)(model->nq + model->n), sizeof *c->state);
     if (!c->words || !c->state || !opspace_make_ring(c) || !opspace_make_places(c)
-        || !opspace_make_contacts(c) || !opspace_make_fall(c) || !opspace_make_integrals(c)) {
+        || !opspace_make_contacts(c) || !opspace_make_fall(c) || !opspace_make_integrals(c)
+        || !opspace_make_ways(c)) {
         opspace_close(c);
         return NULL;
     }
@@ -135,6 +142,7 @@ opspace *opspace_open(const opspace_model *model)
     find_fields(c);
     for (int i = 0; i < model->tasks; i++)
         opspace_note_acceleration(c, i);
+    opspace_begin_ways(c);
     opspace_pack_places(c);
     return c;
 }
@@ -151,6 +159,8 @@ void opspace_close(opspace *c)
         free(c->footing);
         free(c->touching);
         free(c->sums.ahead);
+        free(c->ways.told);
+        free(c->ways.fresh);
         free(c->fall.last);
     }
     free(c);
@@ -299,6 +309,7 @@ int64_t opspace_step(opspace *c, double t, const double *q, const double *v, dou
     memcpy(c->v, v, (size_t)m->n * sizeof *v);
     if (m->base > 0)
         found |= opspace_touch(c);
+    opspace_lead(c);
     opspace_push_integrals(c);
     int64_t answer = opspace_tick(t, c->handle);
     return answered(c, t, found, answer, tau);
@@ -371,8 +382,10 @@ void opspace_restart(opspace *c)
     }
     c->begun = 0;
     opspace_forget_fall(c);
-    for (int i = 0; i < c->model->tasks; i++)
+    for (int i = 0; i < c->model->tasks; i++) {
         c->kind[i * KIND_SIZE + KIND_REMEMBERS] = 0;
+        opspace_forget_way(c, i);
+    }
     /* No task has been at rest. */
     const opspace_task *last = c->model->task + c->model->tasks - 1;
     for (int row = 0; c->model->tasks > 0 && row < last->first_row + last->rows; row++)

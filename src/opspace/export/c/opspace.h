@@ -27,6 +27,7 @@ typedef struct {
     int orientation; /* then a rotation; */
     int joints;      /* or joint positions */
     int level;       /* where it is at first, a place in the levels of the model */
+    int led;         /* whether it goes to targets on ways */
 } opspace_task;
 
 /* A contact, as it was exported. */
@@ -122,7 +123,9 @@ int opspace_find_task(const opspace *controller, const char *name);
  *
  * x is a position (3), then a rotation (9), or joint positions, as the task has them; velocity and
  * acceleration are 3 numbers for each of position and rotation, or one for each joint, NULL for zero.
- * Returns 0, OPSPACE_NO_TASK or OPSPACE_REFUSED: a number is not finite, or x holds no rotation; or
+ * A task that was exported with a max_acceleration goes there on a way, from what it follows then, within
+ * its speed and acceleration; with a velocity that is not zero the target is followed as it is. A target
+ * told again is the same way. Returns 0, OPSPACE_NO_TASK or OPSPACE_REFUSED: a number is not finite, or x holds no rotation; or
  * OPSPACE_BUSY, as everything that may be asked from any thread: 64 wishes wait for the next step, or
  * for times of their own. */
 int opspace_set_target(
@@ -190,8 +193,9 @@ int opspace_contact_row(const opspace *controller, int contact);
  * It is the caller's to change it smoothly. Returns 0, OPSPACE_NO_TASK or OPSPACE_REFUSED. */
 int opspace_set_activation(opspace *controller, int task, double activation);
 
-/* Let time go on from anywhere at the next step; angles take the short way, and no task has been at
- * rest. Tasks on their way go on from where they were, and what waits for its time waits on; times that are given from now on are those
+/* Let time go on from anywhere at the next step; angles take the short way, no task has been at rest, and
+ * ways to targets begin anew where the robot is found. Tasks on their way go on from where they were, and
+ * what waits for its time waits on; times that are given from now on are those
  * of the clock after the pause. From the thread that steps. */
 void opspace_restart(opspace *controller);
 

@@ -101,6 +101,13 @@ struct opspace {
         int begun;
     } sums;
     struct {
+        double *goal, *joint_goal, *more, *joint_more;
+        int64_t *asked, *on;
+        double *told; /* what each task is told, and what it was told before */
+        int *fresh, *known; /* whether it has not been looked at; whether the task follows anything yet */
+        int size;
+    } ways;
+    struct {
         int64_t *count, *rows, *place, *edges;
         double *numbers, *motion, *force, *most, *cone, *metric, *reference, *hindrance;
     } stance;
@@ -115,6 +122,16 @@ void opspace_copy(double *to, const double *from, int count);
 /* opspace_wishes.c: letters. */
 int opspace_make_ring(opspace *c);
 void opspace_read_letters(opspace *c);
+int opspace_speeds_of(const opspace_task *one);
+void opspace_go_to(opspace *c, int task, const double *x);
+
+/* opspace_ways.c: ways to targets. */
+int opspace_make_ways(opspace *c);
+void opspace_begin_ways(opspace *c);
+void opspace_tell_way(opspace *c, int task, const double *x);
+void opspace_forget_way(opspace *c, int task);
+int opspace_is_led(const opspace *c, int task);
+void opspace_lead(opspace *c);
 
 /* opspace_ramps.c: activations in time. */
 double opspace_profile(int code, double s);
@@ -128,7 +145,7 @@ int opspace_make_integrals(opspace *c);
 void opspace_note_acceleration(opspace *c, int task);
 void opspace_push_integrals(opspace *c);
 void opspace_learn_errors(opspace *c, double t, int64_t status);
-void opspace_begin_integral(opspace *c, int task, double t);
+void opspace_forget_integral(opspace *c, int task);
 
 /* opspace_places.c: at which level tasks are. */
 int opspace_make_places(opspace *c);

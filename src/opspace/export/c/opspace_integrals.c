@@ -1,14 +1,10 @@
 /* Integral action of tasks that have it, as opspace.controller.integral; the kernels add errors up. */
 #include "opspace_inside.h"
 
-#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 extern void opspace_learn(void *handle, void *integrals, int64_t status);
-
-/* Columns of a ramp that are read here. */
-enum { TARGET = 1 };
 
 int opspace_make_integrals(opspace *c)
 {
@@ -40,11 +36,18 @@ void opspace_push_integrals(opspace *c)
         const opspace_task *one = &m->task[i];
         if (c->sums.ki[i] == 0.0)
             continue;
+        int led = opspace_is_led(c, i); /* the kernels add it to what a way asks for */
         double *to = c->numbers + i * NUMBERS_SIZE + NUMBERS_GOAL_ACCELERATION;
         for (int k = 0; k < 6 && !one->joints; k++)
-            to[k] = c->sums.ahead[6 * i + k] + c->sums.motion[6 * i + k];
+            to[k] = c->sums.ahead[6 * i + k] + (led ? 0.0 : c->sums.motion[6 * i + k]);
         for (int row = one->first_row; row < one->first_row + one->joints; row++)
-            c->goal[3 * row + 2] = c->sums.ahead[6 * m->tasks + row] + c->sums.joint[row];
+            c->goal[3 * row + 2]
+                = c->sums.ahead[6 * m->tasks + row] + (led ? 0.0 : c->sums.joint[row]);
+        if (led) {
+            memcpy(c->ways.more + 6 * i, c->sums.motion + 6 * i, 6 * sizeof *c->ways.more);
+            memcpy(c->ways.joint_more + one->first_row, c->sums.joint + one->first_row,
+                (size_t)one->rows * sizeof *c->ways.joint_more);
+        }
     }
 }
 
@@ -60,11 +63,10 @@ void opspace_learn_errors(opspace *c, double t, int64_t status)
 }
 
 /* A task that comes anew has learned nothing. */
-void opspace_begin_integral(opspace *c, int task, double t)
+void opspace_forget_integral(opspace *c, int task)
 {
     const opspace_task *one = &c->model->task[task];
-    const double *ramp = c->variable + task * VARIABLE_SIZE;
-    if (!c->sums.ahead || ramp[TARGET] != 0.0 || !opspace_arrived(ramp, nextafter(t, -INFINITY)))
+    if (!c->sums.ahead)
         return;
     memset(c->sums.motion + 6 * task, 0, 6 * sizeof *c->sums.motion);
     memset(c->sums.joint + one->first_row, 0, (size_t)one->rows * sizeof *c->sums.joint);

@@ -4,8 +4,8 @@
 #include <math.h>
 #include <string.h>
 
-/* Columns of a ramp that are written here. */
-enum { START = 2 };
+/* Columns of a ramp that are used here. */
+enum { TARGET = 1, START = 2 };
 
 int opspace_has_time(int what)
 {
@@ -29,6 +29,13 @@ int opspace_let_wait(opspace *c, const letter *asked)
     return 1;
 }
 
+/* Whether a task has gone by this time, so that it comes anew. */
+static int has_gone(const opspace *c, int task, double t)
+{
+    const double *ramp = c->variable + task * VARIABLE_SIZE;
+    return ramp[TARGET] == 0.0 && opspace_arrived(ramp, t);
+}
+
 static void start(opspace *c, const wish *one, double t)
 {
     const double *x = one->x;
@@ -37,7 +44,10 @@ static void start(opspace *c, const wish *one, double t)
     else if (one->what == SWAP_LETTER)
         opspace_let_swap(c, one->about, (int)x[0], t, x[2]);
     else {
-        opspace_begin_integral(c, one->about, t);
+        if (has_gone(c, one->about, t)) {
+            opspace_forget_integral(c, one->about);
+            opspace_forget_way(c, one->about);
+        }
         opspace_send(c->variable + one->about * VARIABLE_SIZE, x[0], t, x[2]);
     }
 }

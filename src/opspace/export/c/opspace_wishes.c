@@ -116,7 +116,7 @@ static int finite_or_none(const double *x, int count)
 }
 
 /* Numbers of the velocity of a target. */
-static int speeds_of(const opspace_task *one)
+int opspace_speeds_of(const opspace_task *one)
 {
     return one->joints ? one->joints : (one->position ? 3 : 0) + (one->orientation ? 3 : 0);
 }
@@ -127,7 +127,7 @@ int opspace_set_target(
     const opspace_task *one = opspace_task_at(c, task);
     if (!one)
         return OPSPACE_NO_TASK;
-    int size = speeds_of(one), given = one->joints + one->position + one->orientation;
+    int size = opspace_speeds_of(one), given = one->joints + one->position + one->orientation;
     if (given == 0 || !opspace_all_finite(x, given) || !finite_or_none(velocity, size)
         || !finite_or_none(acceleration, size))
         return OPSPACE_REFUSED;
@@ -153,7 +153,7 @@ static void go_to_joints(opspace *c, const opspace_task *one, int64_t *kind, con
             c->goal[3 * (one->first_row + i) + k] = x[k * one->joints + i];
 }
 
-static void go_to(opspace *c, int task, const double *x)
+void opspace_go_to(opspace *c, int task, const double *x)
 {
     const opspace_task *one = &c->model->task[task];
     int64_t *kind = c->kind + task * KIND_SIZE;
@@ -170,8 +170,8 @@ static void go_to(opspace *c, int task, const double *x)
     }
     if (one->position)
         opspace_copy(number + NUMBERS_GOAL_POSITION, x, 3);
-    opspace_copy(number + NUMBERS_GOAL_VELOCITY, speeds, speeds_of(one));
-    opspace_copy(number + NUMBERS_GOAL_ACCELERATION, speeds + speeds_of(one), speeds_of(one));
+    opspace_copy(number + NUMBERS_GOAL_VELOCITY, speeds, opspace_speeds_of(one));
+    opspace_copy(number + NUMBERS_GOAL_ACCELERATION, speeds + opspace_speeds_of(one), opspace_speeds_of(one));
 }
 
 int opspace_set_gains(opspace *c, int task, const double *kp, const double *kv)
@@ -287,8 +287,12 @@ static void open_letter(opspace *c, const letter *one)
     const opspace_task *task = &c->model->task[one->about];
     switch (one->what) {
     case TARGET_LETTER:
-        go_to(c, one->about, x);
-        opspace_note_acceleration(c, one->about);
+        if (task->led) {
+            opspace_tell_way(c, one->about, x);
+        } else {
+            opspace_go_to(c, one->about, x);
+            opspace_note_acceleration(c, one->about);
+        }
         break;
     case GAINS_LETTER:
         opspace_copy(c->kp + task->first_row, x, task->rows);
