@@ -26,7 +26,8 @@ def test_every_robot_remembers_as_a_controller_of_its_own():
     q[2] = -1.75
     aside = 0.02 * rng.normal(size=(both.count, q.size))
     pace = np.linspace(0.0, 1.0, both.count)[:, None]
-    plain = osc.Controller(both.robot, osc.Stack(at_rest(both.robot)[0]))
+    always = osc.Singularity(near=0.0)
+    plain = osc.Controller(both.robot, osc.Stack(at_rest(both.robot)[0]), singularity=always)
     apart = 0.0
     for k in range(90):
         if k in (20, 50):
