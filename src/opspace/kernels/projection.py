@@ -22,11 +22,14 @@ def weigh_places(work, stacks):
     slots = work.slots.shape[0]
     below, absent = 0.0, 1.0
     for s in range(slots - 1, -1, -1):
-        here = 1.0
+        # Where no stack has it nothing is left, not even rounding: places for later change no bit.
+        here, somewhere = 1.0, False
         for c in range(stacks):
             if work.corner_on[c] & slot_bit(s) == 0:
                 here -= work.corner_weight[c]
-        work.here[s] = max(here, 0.0)
+            elif work.corner_weight[c] > 0.0:
+                somewhere = True
+        work.here[s] = max(here, 0.0) if somewhere else 0.0
         work.below[s] = below
         absent *= 1.0 - work.here[s]
         if s == 0 or work.slots[s - 1, 0] != work.slots[s, 0]:

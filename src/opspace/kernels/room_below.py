@@ -156,15 +156,15 @@ def _count_places(work, first):
     """How much of each task the first slots have, and how much all, into seen_share (2 slots,).
 
     What the rows count then goes into seen_weight: κ from entry 0 on, ω from entry ``slots`` on, each
-    at the first place of its task.
+    at the first place where its task is: places that are kept for later change no order, and so no bit.
     """
     slots, size = work.slots, work.slots.shape[0]
     for s in range(size):
         work.seen_share[s], work.seen_share[size + s] = 0.0, 0.0
     for s in range(size):
-        before = False
+        before = work.here[s] <= 0.0
         for p in range(s):
-            if slots[p, 1] == slots[s, 1]:
+            if slots[p, 1] == slots[s, 1] and work.here[p] > 0.0:
                 before = True
         if before:
             continue
