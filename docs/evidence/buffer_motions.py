@@ -13,7 +13,8 @@ import numpy as np
 
 import opspace as osc
 
-DEFAULT = osc.Singularity()
+DEFAULT = osc.Singularity(near=0.0)
+"""The default buffers, also where a level is at rest: there those of the default lie lower."""
 KP_TASK, KP_POSTURE = 100.0, 25.0
 """Stiffness of the tasks in Cartesian space and of the posture, 1/s²."""
 MAX_SPEED = 20.0

@@ -17,7 +17,7 @@ import opspace as osc
 DOCUMENT = DOCS / "singularities.md"
 VARIANTS: Mapping[str, osc.Singularity | None] = {
     "without": None,
-    "switch": osc.Singularity(profile="step"),
+    "switch": osc.Singularity(profile="step", near=0.0),
     "transition": DEFAULT,
 }
 RECOVERED = 1e-3
@@ -101,10 +101,10 @@ def singularities() -> list[dict[str, str | float]]:
 
 
 def stops() -> list[dict[str, str | float]]:
-    """Stop the tool nearer and nearer to the wrist singularity and see how far it is off."""
+    """Stop the tool nearer and nearer to the wrist singularity and see how far it is off at rest."""
     rows: list[dict[str, str | float]] = []
     for goal in (-0.7, -0.6, -0.5, -0.4, -0.2, 0.0):
-        done = wrist(DEFAULT, goal=goal)
+        done = wrist(osc.Singularity(), goal=goal)
         at = int(np.searchsorted(done.t, done.back)) - 1
         rows.append(
             {

@@ -1,7 +1,7 @@
 """What lower buffers at rest cost where a target lies out of reach: the table of docs/singularities.md.
 
-``python docs/evidence/rest_beyond_reach.py`` (about two minutes) prints it, and what they cost on the
-way to random targets.
+``python docs/evidence/rest_beyond_reach.py`` (about five minutes) prints it, how fast the arms still are
+at the end of the wait, and what lower buffers cost on the way to random targets.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ import tempfile
 from pathlib import Path
 
 import numpy as np
-from buffer_motions import Reach, Watch, run, tasks
+from buffer_motions import Reach, Run, Watch, run, tasks
 from buffer_targets import ARMS as REACHING
 from buffer_targets import targets
 from seven_joint_arms import load_arm
@@ -25,16 +25,14 @@ WAIT = 8.0
 """How long it waits there, s: long enough to be at rest."""
 
 
-def torque_step(name: str, beyond: float, near: float) -> float:
-    """Largest torque step of an arm that is led so far out of its workspace and back, N·m per ms."""
+def led_out(name: str, beyond: float, near: float) -> Run:
+    """Lead an arm so far out of its workspace, let it wait, and lead it back."""
     reach = Reach.of(name)
     way = reach.way + beyond
     reference, back = reach.out_and_back(way, way / SPEED, WAIT)
     stack = tasks(reference, with_posture=True)
     option = osc.Singularity(near=near)
-    return run(
-        reach.robot, stack, back + way / SPEED + 1.0, singularity=option, back=back
-    ).torque_step
+    return run(reach.robot, stack, back + way / SPEED + 1.0, singularity=option, back=back)
 
 
 def steps_to_targets(robot: osc.Robot, near: float) -> list[float]:
@@ -54,9 +52,10 @@ def steps_to_targets(robot: osc.Robot, near: float) -> list[float]:
 def main() -> None:
     """Measure and print."""
     for beyond in BEYOND:
-        steps = [[torque_step(name, beyond, near) for near in (0.0, 0.3)] for name in ARMS]
-        cells = [f"{without:.2g} → {lower:.2g}" for without, lower in steps]
-        print(f"| {beyond:.2f} | {' | '.join(cells)} |", flush=True)
+        runs = [[led_out(name, beyond, near) for near in (0.0, 0.3)] for name in ARMS]
+        cells = [f"{a.torque_step:.2g} → {b.torque_step:.2g}" for a, b in runs]
+        slowest = max(b.rest_speed for _, b in runs)
+        print(f"| {beyond:.2f} | {' | '.join(cells)} | at rest: {slowest:.1g} rad/s", flush=True)
     with tempfile.TemporaryDirectory() as folder:
         for name in REACHING:
             robot = load_arm(name, Path(folder))

@@ -9,7 +9,7 @@ from opspace import EdgeContact, PointContact, PositionTask
 from opspace.command import Status
 from opspace.compare import METHODS
 from opspace.compare.humanoid import VARIANTS, usable_variants
-from opspace.compare.methods import usable_methods
+from opspace.compare.methods import methods_left_out
 from opspace.compare.tsid_model import tsid_installed
 from opspace.errors import InputError
 from opspace.plots.contact_figure import COLORS, TITLES
@@ -34,7 +34,7 @@ def steps(built, times, q=None, v=None):
 def test_it_is_left_out_and_refused_with_what_to_install(monkeypatch):
     monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
     assert "tsid" not in usable_variants()
-    assert "tsid" not in usable_methods(load_scenario("humanoid"))
+    assert "tsid" in methods_left_out(load_scenario("humanoid"))
     assert VARIANTS["tsid"].needs.startswith("pip install tsid==")
     with pytest.raises(InputError, match="needs TSID's Python package: pip install tsid=="):
         steps(standing(), [0.0])

@@ -153,14 +153,8 @@ METHODS: Mapping[str, Method] = MappingProxyType(
 """Every method by name, the library's own first."""
 
 
-def usable_methods(scenario: Scenario) -> list[str]:
-    """Name the methods that are installed and can run a scenario."""
-    left_out = methods_left_out(scenario)
-    return [name for name in METHODS if name not in left_out]
-
-
 def methods_left_out(scenario: Scenario) -> dict[str, str]:
-    """Say of every other method why it cannot run a scenario, by name."""
+    """Say of every method that cannot run a scenario why, by name."""
     robot = build_robot(scenario)
     stands = bool(scenario.contacts) or robot.floating_base
     found = {name: _why_not(method, scenario, robot, stands) for name, method in METHODS.items()}
@@ -169,7 +163,7 @@ def methods_left_out(scenario: Scenario) -> dict[str, str]:
 
 def _why_not(method: Method, scenario: Scenario, robot: Robot, stands: bool) -> str:
     if not method.installed():
-        return "what it needs is not installed"
+        return "what it needs is not installed: asked for by name it says what that is"
     if stands and not method.stands:
         return "it drives no robot that stands on contacts"
     if not stands and not method.bolted:

@@ -187,6 +187,8 @@ def _layout() -> str:
     whole = {
         **{f"PROFILE_{one.upper().replace('-', '_')}": k for k, one in enumerate(PROFILES)},
         "GROUP_NONE": NO_GROUP,
+        "FROM_FOLLOWED": led_columns.FROM_FOLLOWED,
+        "FROM_FOUND": led_columns.FROM_FOUND,
         "GOAL_TURN": led_columns.GOAL_TURN,
         "GOAL_PLACE": led_columns.GOAL_PLACE,
         "GOAL_SIZE": led_columns.GOAL_SIZE,

@@ -25,7 +25,7 @@ weight in some posture, the second a wrist that other joints could not follow.""
 STRUCTURAL = 1e-6
 """An eigenvalue below this fraction is zero in every posture: the arm has too few joints."""
 PROBES = 3
-"""Postures in which two robots' frames that are the same frame move alike to the last bit."""
+"""Where rows are the same to the last bit in so many postures of one robot, they are the same rows."""
 KNOWN: dict[bytes, np.ndarray] = {}
 """References that have been found in this process, by all that they follow from."""
 MOST_KNOWN = 1024
@@ -121,6 +121,7 @@ class Workspace:
         return sha256(b"|".join(parts)).digest()
 
     def _found(self, task: Task) -> np.ndarray:
+        """Visit all postures for the reference of a task."""
         angular = np.array(task.units) == "rad"
         below_origin = isinstance(task, MotionTask) and angular.any()
         jacobians: list[np.ndarray] = []

@@ -51,7 +51,7 @@ class Singularity:
         damping: Of the joint motion along a direction that answers in part, 1/s; none with release 1.
         near: How far from its target a task in metres is anything but at rest there, m; one in radians
             is at 1 rad for each 0.3 m of it. 0 has the same buffers at rest as in motion; None is
-            0.3 m, or 0 with one buffer or absolute eigenvalues.
+            0.3 m, or 0 with one buffer, absolute eigenvalues or the profile of a switch.
 
     Raises:
         InputError: Not 0 < lower < upper, not 0 < release <= 1, a damping or ``near`` below 0, or a
@@ -87,7 +87,8 @@ class Singularity:
     @property
     def rests_within(self) -> tuple[float, float]:
         """How near its target a task is at rest, m and rad; 0 where buffers are the same at rest."""
-        usual = NEAR if self._may_rest else 0.0
+        # What is switched is mixed with nothing.
+        usual = NEAR if self._may_rest and self.profile != "step" else 0.0
         near = usual if self.near is None else self.near
         return near, TURN_PER_METRE * near
 

@@ -321,6 +321,5 @@ def _singularity(scenario: Scenario) -> Singularity | None:
         profile,
         option.release,
         option.damping,
-        # Buffers that are switched are mixed by nothing.
-        0.0 if profile == SWITCH else option.near,
+        option.near,
     )

@@ -125,7 +125,8 @@ int opspace_find_task(const opspace *controller, const char *name);
  * acceleration are 3 numbers for each of position and rotation, or one for each joint, NULL for zero.
  * A task that was exported with a max_acceleration goes there on a way, from what it follows then, within
  * its speed and acceleration; with a velocity that is not zero the target is followed as it is. A target
- * told again is the same way. Returns 0, OPSPACE_NO_TASK or OPSPACE_REFUSED: a number is not finite, or x holds no rotation; or
+ * told again is the same way. Returns 0, OPSPACE_NO_TASK or OPSPACE_REFUSED: a number is not finite, or x
+ * holds no rotation; or
  * OPSPACE_BUSY, as everything that may be asked from any thread: 64 wishes wait for the next step, or
  * for times of their own. */
 int opspace_set_target(

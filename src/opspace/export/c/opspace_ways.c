@@ -4,9 +4,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Where a way begins: with what is followed until now, or with what the robot has. */
-enum { FROM_FOLLOWED = 1, FROM_FOUND = 2 };
-
 /* Numbers of a target itself, then with its velocity and acceleration. */
 static int goal_size(const opspace_task *one)
 {

@@ -170,8 +170,9 @@ void opspace_go_to(opspace *c, int task, const double *x)
     }
     if (one->position)
         opspace_copy(number + NUMBERS_GOAL_POSITION, x, 3);
-    opspace_copy(number + NUMBERS_GOAL_VELOCITY, speeds, opspace_speeds_of(one));
-    opspace_copy(number + NUMBERS_GOAL_ACCELERATION, speeds + opspace_speeds_of(one), opspace_speeds_of(one));
+    int size = opspace_speeds_of(one);
+    opspace_copy(number + NUMBERS_GOAL_VELOCITY, speeds, size);
+    opspace_copy(number + NUMBERS_GOAL_ACCELERATION, speeds + size, size);
 }
 
 int opspace_set_gains(opspace *c, int task, const double *kp, const double *kv)
