@@ -10,7 +10,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -102,6 +102,14 @@ def shapes_of(robot: Robot) -> tuple[LinkCapsule, ...]:
     return tuple(sorted(found, key=lambda shape: robot.frame_id(shape.frame)))
 
 
+@lru_cache(maxsize=1)
+def _mesh_loader() -> Any:
+    """Return what reads a mesh again only if its file has changed."""
+    import coal  # noqa: PLC0415 - comes with Pinocchio
+
+    return coal.CachedMeshLoader()
+
+
 @lru_cache(maxsize=256)
 def _enclosing(points: bytes) -> tuple[Triple, Triple, float]:
     from opspace.robots.enclosing import enclosing_capsule  # noqa: PLC0415 - imports SciPy's solvers
@@ -126,7 +134,11 @@ def _urdf_pieces(path: Path, robot: Robot) -> Iterator[tuple[str, np.ndarray | L
     directories = [str(parent) for parent in path.resolve().parents[:PACKAGE_DEPTH]]
     try:
         geometry = pin.buildGeomFromUrdf(
-            model, str(path), pin.GeometryType.COLLISION, package_dirs=directories
+            model,
+            str(path),
+            pin.GeometryType.COLLISION,
+            package_dirs=directories,
+            mesh_loader=_mesh_loader(),
         )
     except (ValueError, RuntimeError) as error:
         reason = " ".join(str(error).split())

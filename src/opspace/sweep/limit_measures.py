@@ -50,6 +50,7 @@ class LimitWatch:
         self._index = np.array([side.index for side in self._sides], dtype=int)
         self._limit = np.array([side.limit for side in self._sides])
         self._speed = np.array([side.speed for side in self._sides])
+        self._rounding = _ROUNDING * self._speed
         self._stops = np.zeros(len(self._sides), dtype=bool)
         self._slow = np.zeros(len(self._sides), dtype=bool)
         self._inside = np.zeros(len(self._sides), dtype=bool)
@@ -72,15 +73,16 @@ class LimitWatch:
         tau, numbers = command.tau, self.numbers
         v = self._plant.v
         if self._last is not None:
-            self._most("max_torque_step", float(np.max(np.abs(tau - self._last))))
+            self._most("max_torque_step", float(np.abs(tau - self._last).max()))
         self._last = tau
-        used = np.abs(tau - self._motors.middle) / self._motors.limit
-        self._most("max_torque_use", float(np.max(used)))
-        self._most("max_joint_speed", float(np.max(np.abs(v))))
+        used = float((np.abs(tau - self._motors.middle) / self._motors.limit).max())
+        self._most("max_torque_use", used)
+        self._most("max_joint_speed", float(np.abs(v).max()))
         self._most("max_hard_solves", float(command.hard_solves))
-        numbers["not_finite"] += not np.all(np.isfinite(tau))
-        numbers["above_torque_limit"] += bool(np.any(used > 1.0))
-        for status in self._ticks:
+        numbers["not_finite"] += not np.isfinite(tau).all()
+        numbers["above_torque_limit"] += used > 1.0
+        # Nearly every tick has none.
+        for status in self._ticks if command.status else ():
             self._ticks[status] += status in command.status
         pushed = self._pushed(command.t)
         self._watch_limits(command, self._plant.q, v, pushed)
@@ -118,8 +120,10 @@ class LimitWatch:
         distance = self._sign * (self._limit - q[self._index])
         towards = self._sign * v[self._index]
         beyond = np.maximum(-distance - limits.clearance - _ROUNDING, 0.0)
-        self._inside |= beyond == 0.0
-        self._most("position_outside", float(np.max(beyond, where=self._inside, initial=0.0)))
+        inside = beyond == 0.0
+        self._inside |= inside
+        out = None if inside.all() else beyond
+        self._most("position_outside", _largest(out, self._inside))
         if pushed or Status.LIMIT_LOST in command.status:
             self._stops[:] = self._slow[:] = False
             return
@@ -127,7 +131,12 @@ class LimitWatch:
             allowed = limits.allowed_speed(self._sides[i], float(distance[i]))
             self._stops[i] = towards[i] <= allowed
         self._slow |= towards <= self._speed
-        self._most("position_excess", float(np.max(beyond, where=self._stops, initial=0.0)))
+        self._most("position_excess", _largest(out, self._stops))
         over = towards - self._speed
-        fast = self._slow & (over > _ROUNDING * self._speed)
-        self._most("speed_excess", float(np.max(over, where=fast, initial=0.0)))
+        fast = self._slow & (over > self._rounding)
+        self._most("speed_excess", _largest(over if fast.any() else None, fast))
+
+
+def _largest(values: np.ndarray | None, where: np.ndarray) -> float:
+    """Return the largest of some values; 0 of none."""
+    return 0.0 if values is None else float(np.max(values, where=where, initial=0.0))
