@@ -6,12 +6,14 @@ import math
 
 from opspace.command import Status
 from opspace.kernels.columns import (
+    FIRST_ROW,
     GOAL_ACCELERATION,
     GOAL_POSITION,
     GOAL_ROTATION,
     GOAL_VELOCITY,
     MAX_SPEED,
     REMEMBERS,
+    ROWS,
     SOLVE,
     SPEED_LIMITED,
 )
@@ -51,6 +53,7 @@ from opspace.kernels.cycle_columns import (
     WOKE,
 )
 from opspace.kernels.gravity import gravity
+from opspace.kernels.led_columns import GOAL_SIZE
 from opspace.kernels.many_states import brake
 from opspace.kernels.tick import tick
 from opspace.machine.jit import jit
@@ -80,7 +83,7 @@ def cycles(work, loop):
         status = take_state(work, loop)
         if loop.frozen_for_too_long[0] != 0:
             return FROZEN
-        if loop.mail[0] != 0:
+        if loop.mail[0] != loop.mail[1]:
             take_mail(work, loop)
         status |= command(work, loop)
         write(loop)
@@ -180,18 +183,40 @@ def take_mail(work, loop):
     """Take targets and gains that have been sent, all at once."""
     for r in range(work.kp.shape[0]):
         work.kp[r], work.kv[r] = loop.kp[r], loop.kv[r]
-        for c in range(3):
-            work.goal[r, c] = loop.goal[r, c]
     for i in range(work.kind.shape[0]):
-        copy_columns(work.numbers, loop.numbers, i, GOAL_ROTATION, 9)
-        copy_columns(work.numbers, loop.numbers, i, GOAL_POSITION, 3)
-        copy_columns(work.numbers, loop.numbers, i, GOAL_VELOCITY, 6)
-        copy_columns(work.numbers, loop.numbers, i, GOAL_ACCELERATION, 6)
         copy_columns(work.numbers, loop.numbers, i, MAX_SPEED, 2)
         work.kind[i, SPEED_LIMITED] = loop.kind[i, SPEED_LIMITED]
+        if i < work.led.pace.shape[0] and loop.pace[i, 0] != 0.0:
+            ask_way(work, loop, i)
+        else:
+            take_goal(work, loop, i)
         if loop.forgets[i] != 0:
             work.kind[i, REMEMBERS] = 0
-    loop.mail[0] = 0
+    loop.mail[1] = loop.mail[0]
+
+
+@jit
+def take_goal(work, loop, i):
+    """Desire what has been sent."""
+    for r in range(work.kind[i, FIRST_ROW], work.kind[i, FIRST_ROW] + work.kind[i, ROWS]):
+        for c in range(3):
+            work.goal[r, c] = loop.goal[r, c]
+    copy_columns(work.numbers, loop.numbers, i, GOAL_ROTATION, 9)
+    copy_columns(work.numbers, loop.numbers, i, GOAL_POSITION, 3)
+    copy_columns(work.numbers, loop.numbers, i, GOAL_VELOCITY, 6)
+    copy_columns(work.numbers, loop.numbers, i, GOAL_ACCELERATION, 6)
+
+
+@jit
+def ask_way(work, loop, i):
+    """Have a way begin where one has been asked for; what is desired stays what it is until then."""
+    led = work.led
+    copy_columns(led.pace, loop.pace, i, 0, 4)
+    if loop.asked_way[i] != 0:
+        copy_columns(led.goal, loop.way_goal, i, 0, GOAL_SIZE)
+        for r in range(work.kind[i, FIRST_ROW], work.kind[i, FIRST_ROW] + work.kind[i, ROWS]):
+            led.joint_goal[r] = loop.joint_way_goal[r]
+        led.asked[i] = loop.asked_way[i]
 
 
 @jit

@@ -133,14 +133,15 @@ class FreeCycles:
         stack = self._controller.stack
         if not stack.settled or stack.waiting:
             record.asked[0] = 1
-        elif letters.changed and not record.mail[0]:
-            if not letters.write():
+        elif letters.changed and record.mail[0] == record.mail[1]:
+            number = record.mail[0].item() + 1
+            if not letters.write(number):
                 record.asked[0] = 1
                 return
             for name, array in letters.arrays().items():
                 getattr(record, name)[:] = array
             time.sleep(0.0)  # what was written is seen before this word is
-            record.mail[0] = 1
+            record.mail[0] = number
 
     def run(self, last: RobotState, heard: float, sent: np.ndarray, ends: float) -> int:
         """Run cycles until something needs Python; for the loop's thread.
@@ -155,17 +156,20 @@ class FreeCycles:
             Why it has ended, see `opspace.kernels.cycle_columns`.
         """
         assert self._ready is not None
-        plan, _, record, address = self._ready
+        plan, letters, record, address = self._ready
         record.whole[c.SEEN] = self._driver.seen
         record.whole[[c.FROZEN_FOR, c.STATUSES]] = 0
         record.number[[c.LAST, c.HEARD, c.ENDS]] = last.t, heard, ends
         record.before[:] = sent
-        record.asked[0] = record.mail[0] = 0
+        record.asked[0] = 0
+        record.mail[1] = record.mail[0]  # what has not been taken by now Python has taken up
+        letters.begin(record.mail[0].item())
         self._runs = True
         try:
             return KERNELS["cycles"](plan.handle.address, address)
         finally:
             self._runs = False
+            letters.hand_back(record.mail[1].item())
             self._driver.seen = int(record.whole[c.SEEN])
             # The tick of Python that comes next is none of those before.
             if self._controller._timing is not None:
@@ -193,6 +197,7 @@ class FreeCycles:
         moment = np.zeros(4, np.int64)
         sizes = {"n": n, "nq": plan.tick.q.size, "tasks": plan.size.tasks, "rows": plan.size.rows}
         sizes |= {"told": read.size, "ring": len(self._history.rows)}
+        sizes |= {"led": plan.size.led, "led_rows": plan.size.led_rows}
         given = {
             "wanted": memory.wanted,
             "state": memory.state,

@@ -8,6 +8,7 @@ import numpy as np
 
 from opspace.kernels.columns import KIND_SIZE, NUMBERS_SIZE
 from opspace.kernels.cycle_columns import COUNTS, NUMBERS, WHOLES
+from opspace.kernels.led_columns import GOAL_SIZE
 from opspace.machine.field_table import Field, RecordTable
 
 _INT = np.int64
@@ -41,7 +42,7 @@ CYCLES = RecordTable(
     _caller("address", (2,), "where these two are", dtype=_INT),
     _own("ring", ("ring", "2 n + nq + 3"), "the last cycles, see `opspace.loop.history.History`"),
     _caller(
-        "mail", (1,), "not 0 where what follows is to be taken; the loop clears it", dtype=_INT
+        "mail", (2,), "number of the letter that follows, and of the last one taken", dtype=_INT
     ),
     _caller("goal", ("rows", 3), "as in the plan", "rad, rad/s, rad/s²"),
     _caller("kp", ("rows",), "as in the plan", "1/s²"),
@@ -49,4 +50,8 @@ CYCLES = RecordTable(
     _caller("kind", ("tasks", KIND_SIZE), "as in the plan, for what limits the speed", dtype=_INT),
     _caller("numbers", ("tasks", NUMBERS_SIZE), "as in the plan, for goals and speeds"),
     _caller("forgets", ("tasks",), "not 0 where angles take the short way", dtype=_INT),
+    _caller("pace", ("led", 4), "as in `opspace.plan.led_records.LED`"),
+    _caller("asked_way", ("led",), "where a new way is to begin, 0 for none", dtype=_INT),
+    _caller("way_goal", ("led", GOAL_SIZE), "where it goes", "m"),
+    _caller("joint_way_goal", ("led_rows",), "the same of a task of joints", "rad, m"),
 )

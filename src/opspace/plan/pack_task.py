@@ -67,7 +67,7 @@ from opspace.tasks.motions import CenterOfMass, RelativeFrame, WorldFrame
 from opspace.tasks.posture import PostureTask
 from opspace.tasks.quantities import Orientation, Pose, Position
 from opspace.tasks.references import Sample
-from opspace.tasks.tracking import Hold, TrackingTask
+from opspace.tasks.tracking import Hold, Target, TrackingTask
 from opspace.tasks.way_round import WayRound
 from opspace.tasks.ways import Way
 
@@ -409,7 +409,7 @@ class Packed:
 
     def _pack(self, robot: AdapterBase, t: float) -> None:
         task = self.task
-        if self.led is not None and task._gains.max_acceleration is not None:
+        if self.led is not None and self._is_led:
             self._lead(robot, t, self.led)
             return
         target = task._target
@@ -443,6 +443,12 @@ class Packed:
                 self._write(task.pushed(desired), target, task._held, gains)
         self.target, self.held, self.gains = target, task._held, gains
         self._timed = task.ki is not None or callable(target.goal)
+
+    def go_to(self, target: Target) -> None:
+        """Take it that compiled code has been asked for a way to a target by somebody else."""
+        assert self.led is not None
+        self.target, self.held = target, self.task._held
+        self.led.asked, self.led.way = target, None
 
     def _ask(self, robot: AdapterBase, t: float, target: Any, led: LedGoal) -> None:
         """Have a way begin with what is followed until now, or else with what is found."""
