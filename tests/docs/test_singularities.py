@@ -152,7 +152,9 @@ def test_fewer_targets_are_missed_with_two_buffers(script):
     assert document.block(targets.DOCUMENT, "targets") == targets.written(rows)
     for row in rows:
         missed = {name: int(row[f"{name}_missed"]) for name in targets.VARIANTS}
-        assert missed["rest"] <= missed["two"] <= missed["one"] <= int(row["reached without handling"])
+        assert (
+            missed["rest"] <= missed["two"] <= missed["one"] <= int(row["reached without handling"])
+        )
         assert row["rest_late"] == "0"
     one, two, rest = (sum(int(row[f"{name}_missed"]) for row in rows) for name in targets.VARIANTS)
     assert rest < two < one

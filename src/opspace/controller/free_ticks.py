@@ -102,8 +102,10 @@ class Letters:
                 else:
                     packed._pack_ahead()
         self._seen = last
+        if not all(_up_to_date(packed) and _settled(packed) for packed in copy.packed):
+            return False
         self._told.append((number, told))
-        return all(_up_to_date(packed) and _settled(packed) for packed in copy.packed)
+        return True
 
     def _lead(self, i: int, packed: Packed, told: dict[int, Target]) -> None:
         """Ask for a way to a target that is a value; any other is left to Python."""
