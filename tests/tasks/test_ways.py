@@ -155,6 +155,30 @@ def test_a_target_that_jumps_does_not_step_the_torque(kind, name):
 
 
 @KINDS
+@pytest.mark.parametrize("name", list(TASKS))
+def test_a_target_that_jumps_after_an_arrival_does_not_step_the_torque(kind, name):
+    """Also where a pose has arrived with its place or its turn alone."""
+    robot, task = osc.load_robot("puma560"), TASKS[name]()
+    q, v = robot.q_reference, np.zeros(6)
+    controller = kind(robot, osc.Stack([task, osc.PostureTask()]))
+    controller.step(0.0, q, v)
+    targets, t = goals(task, robot), 1.0
+    for k in range(4):
+        task.target = targets[k % 2]
+        controller.step(t, q, v)
+        way = task.way
+        ends = sorted((way.place.end, way.turn.end)) if isinstance(way, PoseWay) else [way.end]
+        t = ends[0 if k % 2 else -1] + 0.5 * DT
+        before = controller.step(t, q, v).tau
+        task.target = targets[(k + 1) % 2]
+        t += DT
+        after = controller.step(t, q, v).tau
+        assert np.abs(after - before).max() < 1.0
+        t = task.way.end + 1.0
+        controller.step(t, q, v)
+
+
+@KINDS
 def test_a_task_that_comes_in_begins_where_it_finds_the_robot(kind):
     robot = osc.load_robot("puma560")
     q, v = robot.q_reference, np.zeros(6)

@@ -149,8 +149,8 @@ class Letters:
         found = {name: getattr(tick, name) for name in ("goal", "kp", "kv", "kind", "numbers")}
         found |= {"forgets": (tick.kind[:, REMEMBERS] == 0).astype(np.int64)}
         led = tick.led
-        ways = {"pace": led.pace, "asked_way": led.asked, "way_goal": led.goal}
-        return found | ways | {"joint_way_goal": led.joint_goal}
+        ways = {"pace": led.pace, "asked_way": led.asked, "way_goal": led.asked_goal}
+        return found | ways | {"joint_way_goal": led.joint_asked}
 
 
 def _up_to_date(packed: Packed) -> bool:

@@ -46,7 +46,7 @@ PRESS = ("GIVEN", "GIVEN_AT", "WANTED", "FORCES", "ON", "KI", "KP", "PRESS_SIZE"
 INNER = (
     "space.first_kept",
     *(f"stance.{name}" for name in ("count", "rows", "place", "edges", "numbers", "motion")),
-    *(f"led.{name}" for name in ("goal", "joint_goal", "more", "joint_more", "asked", "on")),
+    *(f"led.{name}" for name in ("asked_goal", "joint_asked", "more", "joint_more", "asked", "on")),
     *(f"integrals.{name}" for name in ("ki", "integral", "joint_integral", "since")),
     *(f"stance.{name}" for name in ("force", "most", "cone", "metric", "reference", "hindrance")),
 )

@@ -213,9 +213,9 @@ def ask_way(work, loop, i):
     led = work.led
     copy_columns(led.pace, loop.pace, i, 0, 4)
     if loop.asked_way[i] != 0:
-        copy_columns(led.goal, loop.way_goal, i, 0, GOAL_SIZE)
+        copy_columns(led.asked_goal, loop.way_goal, i, 0, GOAL_SIZE)
         for r in range(work.kind[i, FIRST_ROW], work.kind[i, FIRST_ROW] + work.kind[i, ROWS]):
-            led.joint_goal[r] = loop.joint_way_goal[r]
+            led.joint_asked[r] = loop.joint_way_goal[r]
         led.asked[i] = loop.asked_way[i]
 
 

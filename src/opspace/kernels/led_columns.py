@@ -6,5 +6,5 @@ FROM_FOLLOWED, FROM_FOUND = 1, 2
 """Where a way that is asked for begins: with what is desired until now, or with what the robot has."""
 
 GOAL_TURN, GOAL_PLACE = 0, 9
-"""Columns of ``Led.goal``: a rotation by rows, then a position."""
+"""Columns of ``Led.goal`` and ``Led.asked_goal``: a rotation by rows, then a position."""
 GOAL_SIZE = 12

@@ -19,7 +19,7 @@ from opspace.kernels.columns import (
     REMEMBERS,
     ROWS,
 )
-from opspace.kernels.led_columns import FROM_FOUND, GOAL_PLACE
+from opspace.kernels.led_columns import FROM_FOUND, GOAL_PLACE, GOAL_SIZE
 from opspace.kernels.motion import P, R, measure
 from opspace.kernels.swift_way import follow_way, plan_way, rates_of_turn
 from opspace.kernels.task_rows import _quaternion, joint_position
@@ -89,6 +89,8 @@ def _begin_motion(t, work, i):
     """Plan the way of a task of motion from what is desired."""
     led, number, turn = work.led, work.numbers[i], 0
     way, pace = led.parts[i], led.pace[i]
+    for c in range(GOAL_SIZE):
+        led.goal[i, c] = led.asked_goal[i, c]
     if work.kind[i, QUANTITY] != ORIENTATION:
         for c in range(3):
             way[c, BEGAN] = number[GOAL_POSITION + c]
@@ -240,6 +242,7 @@ def _begin_joints(t, work, i, first, rows):
     led, way, pace = work.led, work.led.joint_parts, work.led.pace[i]
     for row in range(first, first + rows):
         way[row, BEGAN] = work.goal[row, 0]
+        led.joint_goal[row] = led.joint_asked[row]
         away = led.joint_goal[row] - way[row, BEGAN]
         if work.endless[row] != 0:
             away -= 2.0 * math.pi * math.ceil(away / (2.0 * math.pi) - 0.5)

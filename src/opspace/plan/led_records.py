@@ -27,7 +27,14 @@ LED = RecordTable(
         "asked", ("led",), "where a way is to begin, see `opspace.kernels.led_columns`; 0 for none"
     ),
     _whole("on", ("led",), "whether a task is on a way, or has come to its end"),
-    _told("goal", ("led", GOAL_SIZE), "where it goes: a rotation by rows, a position", "m"),
+    _told(
+        "asked_goal",
+        ("led", GOAL_SIZE),
+        "where a way that is asked for goes: a rotation by rows, a position",
+        "m",
+    ),
+    _told("joint_asked", ("led_rows",), "the same of a task of joints", "rad, m"),
+    _kept("goal", ("led", GOAL_SIZE), "where the way goes that has begun", "m"),
     _kept("joint_goal", ("led_rows",), "the same of a task of joints", "rad, m"),
     _told("more", ("led", 6), "what integral action adds to its acceleration", "m/s², rad/s²"),
     _told("joint_more", ("led_rows",), "the same of a task of joints", "rad/s², m/s²"),

@@ -53,9 +53,9 @@ class LedGoal:
             target: Where it goes.
             start: Where it begins, see `opspace.kernels.led_columns`.
         """
-        goal, told = cast("np.ndarray", target.goal), self._led.goal[self._index]
+        goal, told = cast("np.ndarray", target.goal), self._led.asked_goal[self._index]
         if self._of_joints:
-            self._led.joint_goal[self._rows] = goal
+            self._led.joint_asked[self._rows] = goal
         elif self._kind[QUANTITY] == POSITION:
             told[PLACE] = goal
         elif self._kind[QUANTITY] == ORIENTATION:

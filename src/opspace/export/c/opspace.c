@@ -68,8 +68,8 @@ static void find_fields(opspace *c)
     c->slot_off = memory_of(c, "slot_off");
     c->slot_place = memory_of(c, "slot_place");
     c->first_kept = memory_of(c, "space.first_kept");
-    c->ways.goal = memory_of(c, "led.goal");
-    c->ways.joint_goal = memory_of(c, "led.joint_goal");
+    c->ways.asked_goal = memory_of(c, "led.asked_goal");
+    c->ways.joint_asked = memory_of(c, "led.joint_asked");
     c->ways.more = memory_of(c, "led.more");
     c->ways.joint_more = memory_of(c, "led.joint_more");
     c->ways.asked = memory_of(c, "led.asked");

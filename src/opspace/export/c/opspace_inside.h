@@ -101,7 +101,7 @@ struct opspace {
         int begun;
     } sums;
     struct {
-        double *goal, *joint_goal, *more, *joint_more;
+        double *asked_goal, *joint_asked, *more, *joint_more;
         int64_t *asked, *on;
         double *told; /* what each task is told, and what it was told before */
         int *fresh, *known; /* whether it has not been looked at; whether the task follows anything yet */

@@ -52,11 +52,11 @@ void opspace_begin_ways(opspace *c)
         if (!one->led)
             continue;
         double *x = told(c, i);
-        const double *number = c->numbers + i * NUMBERS_SIZE, *goal = c->ways.goal + i * GOAL_SIZE;
+        const double *number = c->numbers + i * NUMBERS_SIZE, *goal = c->ways.asked_goal + i * GOAL_SIZE;
         int asked = c->ways.asked[i] != 0, size = goal_size(one), speeds = opspace_speeds_of(one);
         for (int row = 0; row < one->joints; row++) {
             const double *place = c->goal + 3 * (one->first_row + row);
-            x[row] = asked ? c->ways.joint_goal[one->first_row + row] : place[0];
+            x[row] = asked ? c->ways.joint_asked[one->first_row + row] : place[0];
             x[size + row] = asked ? 0.0 : place[1];
             x[size + speeds + row] = asked ? 0.0 : place[2];
         }
@@ -113,8 +113,8 @@ static int at_rest(const double *x, int count)
 static void ask(opspace *c, int task, const double *x)
 {
     const opspace_task *one = &c->model->task[task];
-    double *goal = c->ways.goal + task * GOAL_SIZE;
-    opspace_copy(c->ways.joint_goal + one->first_row, x, one->joints);
+    double *goal = c->ways.asked_goal + task * GOAL_SIZE;
+    opspace_copy(c->ways.joint_asked + one->first_row, x, one->joints);
     if (!one->joints) {
         opspace_copy(goal + GOAL_PLACE, x, one->position);
         opspace_copy(goal + GOAL_TURN, x + one->position, one->orientation);
