@@ -163,6 +163,17 @@ def test_a_process_that_dies_or_hangs_is_replaced(monkeypatch):
     assert found[1]["reason"] == "SIGKILL"
 
 
+def _serve_nothing(plan, pipe):
+    sys.exit(3)
+
+
+def test_a_sweep_whose_processes_cannot_begin_says_so_at_once(monkeypatch):
+    monkeypatch.setattr(pool, "_serve", _serve_nothing)
+    rows = pool.run_here(SweepPlan(BASE, [GAIN], runs=400), range(400), 1, timeout=6.0)
+    with pytest.raises(InputError, match=r"before its first run \(exit status 3\).*__main__"):
+        next(rows)
+
+
 def test_the_time_allowed_begins_when_the_process_is_ready(monkeypatch):
     monkeypatch.setattr(pool, "_serve", _serve_late)
     (row,) = pool.run_here(SweepPlan(BASE, [GAIN], runs=1), [0], 1, timeout=2.5)

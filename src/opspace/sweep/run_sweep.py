@@ -99,7 +99,7 @@ def run_sweep(
         All rows.
 
     Raises:
-        InputError: A number that cannot be used.
+        InputError: A number that cannot be used, or processes that end before their first run.
         ScenarioError: The first run is no scenario: a misspelt key, a value out of range.
         RecordingError: The directory holds something else.
     """

@@ -12,6 +12,7 @@ from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
 from typing import Any
 
+from opspace.errors import InputError
 from opspace.plan.entries import KERNELS
 from opspace.sweep.row import empty_row, run_row
 from opspace.sweep.sweep_plan import SweepPlan
@@ -45,9 +46,14 @@ def run_here(
 
     Yields:
         Rows, in the order in which they are finished.
+
+    Raises:
+        InputError: A process ended before any could begin with its first run, as every one does that a
+            script starts outside ``if __name__ == "__main__":``.
     """
     waiting = list(reversed(indices))
     workers = [_start(plan) for _ in range(min(jobs, len(waiting)))]
+    begun = False
     try:
         for worker in workers:
             _assign(worker, waiting)
@@ -59,7 +65,13 @@ def run_here(
                     row = _received(worker, plan)
                     if row is None:
                         worker.started, worker.since = True, time.monotonic()
+                        begun = True
                         continue
+                    if row["ended"] == "died" and not begun:
+                        raise InputError(
+                            f"a process of the sweep ended before its first run ({row['reason']}), see "
+                            'above; a script runs a sweep below if __name__ == "__main__":'
+                        )
                 elif time.monotonic() - worker.since > timeout:
                     row = _lost(plan, worker.index, "timed out", f"after {timeout:g} s")
                     worker.process.kill()
