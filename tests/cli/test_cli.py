@@ -40,6 +40,8 @@ def test_the_version_is_printed(capsys):
     status, out, _ = run(capsys, "--version")
     assert status == 0
     assert out.startswith("opspace ")
+    module = [sys.executable, "-m", "opspace", "--version"]
+    assert subprocess.run(module, capture_output=True, text=True, check=True).stdout == out
 
 
 @pytest.mark.parametrize(
