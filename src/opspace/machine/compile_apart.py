@@ -52,6 +52,8 @@ def compile_apart(
     program = PROGRAM.format(path=path, module=module, processors=[*map(tuple, processors)])
     # How a user has numba treat functions of the user's own is nothing to kernels.
     environment = {k: x for k, x in os.environ.items() if not k.startswith("NUMBA_")}
+    # It writes an error in colours about every overload that it tries and does not take.
+    environment["NUMBA_DISABLE_ERROR_MESSAGE_HIGHLIGHTING"] = "1"
     try:
         done = subprocess.run(
             [sys.executable, "-c", program],

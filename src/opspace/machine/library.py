@@ -20,7 +20,7 @@ from opspace.machine.python_call import PythonCalls
 
 log = logging.getLogger("opspace")
 
-ESTIMATE = "about half a minute, on a busy machine several"
+ESTIMATE = "one to two minutes, on a busy machine several"
 """How long it takes, measured on a shared core: 35 s of it, 36 to 40 in all."""
 
 
