@@ -170,14 +170,14 @@ def ways(robot):
 
 
 def test_ways_to_new_targets_of_each_robot():
-    """From rest and on the way, with and without feed-forward, held and found, in and out again."""
+    """From rest, on the way and from its end, with feed-forward, held and found, in and out again."""
     both = Beside(make=ways, torque_limits="report")
     both.fleet.insert(both.later, 0, robots=[])
     rng = np.random.default_rng(21)
     Q, V = both.states(rng, 0.4, 0.1)
     poses = [0, 2]
     for k in range(80):
-        if k in (2, 9, 20, 21, 30):
+        if k in (2, 9, 20, 21, 30, 76):
             goals = [0.4, 0.1, 0.3] + rng.uniform(-0.2, 0.2, (both.count, 3))
             turns = rng.normal(size=(both.count, 4))
             turns /= np.linalg.norm(turns, axis=1, keepdims=True)
