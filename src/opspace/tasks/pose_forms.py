@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
 from numpy.typing import ArrayLike
 
 from opspace.errors import InputError
@@ -44,6 +43,6 @@ def _split(given: Array, what: str) -> tuple[Array, Array]:
             f"{what} must be a (4, 4) matrix, seven numbers [x y z, qw qx qy qz] "
             f"or a pair (position, orientation), not of shape {given.shape}"
         )
-    if not np.array_equal(given[3], (0.0, 0.0, 0.0, 1.0)):
+    if given[3].tolist() != [0.0, 0.0, 0.0, 1.0]:
         raise InputError(f"{what}: the last row of a (4, 4) pose must be 0 0 0 1")
     return given[:3, 3], given[:3, :3]

@@ -8,12 +8,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from opspace.errors import InputError
-from opspace.tasks.validation import Array, finite_array, numbers
+from opspace.tasks.validation import Array, numbers, require_finite
 
 Quaternion = tuple[float, float, float, float]
 
 # Rotations typed with three decimals pass and are renormalised; anything further off is a mistake.
 ORTHONORMAL_TOLERANCE = 1e-3
+_NOWHERE = np.eye(4)
 
 
 def cross(a: Array, b: Array) -> Array:
@@ -118,7 +119,7 @@ def exp_rotation(phi: Array) -> Array:
 
 def homogeneous(position: Array, R: Array) -> Array:
     """Return the (4, 4) matrix of a position (3,) m and a rotation matrix."""
-    pose = np.eye(4)
+    pose = _NOWHERE.copy()
     pose[:3, :3] = R
     pose[:3, 3] = position
     return pose
@@ -140,13 +141,14 @@ def as_rotation(value: ArrayLike, what: str) -> Array:
     """
     given = numbers(value, what)
     if given.shape == (4,):
-        w, x, y, z = finite_array(given, (4,), what).tolist()
+        require_finite(given, what)
+        w, x, y, z = given.tolist()
         norm = math.hypot(w, x, y, z)
         if abs(norm - 1.0) > ORTHONORMAL_TOLERANCE:
             raise InputError(f"{what} is a quaternion (wxyz) of norm {norm:.6g}, not 1")
         R = matrix_from_quaternion((w / norm, x / norm, y / norm, z / norm))
     elif given.shape == (3, 3):
-        given = finite_array(given, (3, 3), what)
+        require_finite(given, what)
         R = matrix_from_quaternion(quaternion_from_matrix(given))
         gap = float(np.abs(given - R).max())
         if gap > ORTHONORMAL_TOLERANCE:

@@ -404,17 +404,24 @@ class TrackingTask(Task):
         return VectorWay.to(now, goal, t, self._pace())
 
     def _sampled(self, target: Target, reference: Reference, t: float) -> Sample:
-        what = f"task {self.name!r}: reference at t = {t:.6g} s:"
         followed = self._followed
         if followed is None or followed.target is not target:
             followed = self._followed = Followed(target, begun(reference, t))
         sample = followed.reference(t - followed.pauses)
+        try:
+            return self._checked(sample, "")
+        except InputError:  # once more, for the words
+            return self._checked(sample, f"task {self.name!r}: reference at t = {t:.6g} s: ")
+
+    def _checked(self, sample: object, what: str) -> Sample:
+        """Return what a reference gave, in the task's own form."""
         if not isinstance(sample, tuple) or len(sample) != 3:
-            raise InputError(f"{what} must give a Sample(x, v, a), not {shown(sample)}")
+            raise InputError(f"{what}must give a Sample(x, v, a), not {shown(sample)}")
+        x, v, a = sample
         return Sample(
-            self._check_value(sample[0], f"{what} x"),
-            self._vector(sample[1] if np.size(sample[1]) else None, f"{what} v"),
-            self._vector(sample[2] if np.size(sample[2]) else None, f"{what} a"),
+            self._check_value(x, what + "x"),
+            self._vector(v if np.size(v) else None, what + "v"),
+            self._vector(a if np.size(a) else None, what + "a"),
         )
 
     def _words(self) -> list[str]:

@@ -14,6 +14,9 @@ Array = NDArray[np.float64]
 _NUMERIC = "biufO"
 """Kinds of arrays that may hold real numbers; others are turned into floats in strange ways."""
 _LONG = 80
+_FLOAT = np.dtype(float)
+_FEW = 16
+"""Of so many numbers a sum in Python takes less time than a look with NumPy."""
 
 
 def finite_array(value: ArrayLike, shape: tuple[int | None, ...] | None, what: str) -> Array:
@@ -31,12 +34,28 @@ def finite_array(value: ArrayLike, shape: tuple[int | None, ...] | None, what: s
         InputError: Not numbers, another shape, or a value that is not finite.
     """
     array = numbers(value, what)
-    if shape is not None and not _fits(array.shape, shape):
+    if shape is not None and array.shape != shape and not _fits(array.shape, shape):
         raise InputError(f"{what} must have shape {_words(shape)}, not {array.shape}")
-    if not np.isfinite(array).all():
-        raise InputError(f"{what} must be finite, not {shown(array.tolist())}")
+    require_finite(array, what)
     array.flags.writeable = False
     return array
+
+
+def require_finite(array: Array, what: str) -> None:
+    """Refuse numbers of which one is not finite.
+
+    Args:
+        array: The numbers.
+        what: What they are, at the start of the error message.
+
+    Raises:
+        InputError: One is not.
+    """
+    # The sum is finite, unless the numbers are too large for it.
+    if array.size <= _FEW and math.isfinite(sum(array.ravel().tolist())):
+        return
+    if not np.isfinite(array).all():
+        raise InputError(f"{what} must be finite, not {shown(array.tolist())}")
 
 
 def numbers(value: ArrayLike, what: str) -> Array:
@@ -52,6 +71,8 @@ def numbers(value: ArrayLike, what: str) -> Array:
     Raises:
         InputError: Not numbers, or rows of different lengths.
     """
+    if type(value) is np.ndarray and value.dtype is _FLOAT:
+        return value.copy()
     try:
         found = np.array(value)
         if found.dtype.kind in _NUMERIC:

@@ -62,11 +62,10 @@ def _checked(sample: object, part: str) -> Sample:
             f"PoseReference: the {part} must give a Sample(x, v, a), not {shown(sample)}"
         )
     x, v, a = sample
-    rates = (_rate(v, f"{part} velocity"), _rate(a, f"{part} acceleration"))
-    return Sample(np.asarray(x), *rates)
+    return Sample(np.asarray(x), _rate(v, part, "velocity"), _rate(a, part, "acceleration"))
 
 
-def _rate(value: ArrayLike, what: str) -> Array:
+def _rate(value: ArrayLike, part: str, what: str) -> Array:
     if np.size(value) == 0:
         return np.zeros(3)
-    return finite_array(value, (3,), f"PoseReference: {what}")
+    return finite_array(value, (3,), f"PoseReference: {part} {what}")
