@@ -146,7 +146,7 @@ def test_a_program_that_presses_gives_the_same_bits(tmp_path):
     assert ours.step(0.0, Q[0], V[0])[0] == -4
     assert ours.set("wrench", press, 0.0, np.full(6, np.nan)) == -3
     assert ours.set("wrench", controller.stack.members[2].task, 0.0, wrench) == -3
-    assert ours.set("force", press, np.array([-3.0])) == -3
+    assert ours.set("force", press, np.array([0.0])) == -3
     assert ours.set("gains", press, np.zeros(1), np.array([1.0])) == -3
     assert ours.set("target", press, wrench, None, None) == -3
     for k, (t, q, v) in enumerate(zip(T.tolist(), Q, V, strict=True)):

@@ -178,6 +178,63 @@ def test_a_target_that_jumps_after_an_arrival_does_not_step_the_torque(kind, nam
         controller.step(t, q, v)
 
 
+def at_rest(kind, **options):
+    """An arm with a task on ways, the place of its tool, and how it answers there at some time."""
+    robot = osc.load_robot("puma560")
+    q, v = robot.q_reference, np.zeros(6)
+    robot.update(q, v)
+    hand = osc.PositionTask(**(PACED | options))
+    controller = kind(robot, osc.Stack([hand, osc.PostureTask(target=q)]))
+    x = robot.position(robot.tool).copy()
+    return controller, hand, x, lambda t: controller.step(t, q, v).tau
+
+
+@KINDS
+@pytest.mark.parametrize("returns", [0, 1, 3])
+def test_a_way_begins_at_a_value_with_a_velocity_that_is_followed_anew(kind, returns):
+    """After a restart, or where a plan that is kept is taken up again."""
+    controller, hand, x, torque = at_rest(kind)
+    hand.set_target(x + [0.0, 0.0, 0.02], [0.01, 0.0, 0.0])
+    torque(1.0)
+    for k in range(returns):
+        controller.stack.remove(hand, 0.0)
+        torque(2.0 + 4.0 * k)
+        controller.stack.insert(hand, 0.0, 0.0)
+        torque(3.0 + 4.0 * k)
+    if not returns:
+        controller.restart()
+        torque(2.0)
+    before = torque(20.0)
+    hand.set_target(x + [0.0, 0.0, 0.03])
+    assert np.abs(torque(20.0 + DT) - before).max() < 1.0
+
+
+@KINDS
+def test_a_way_goes_on_in_another_plan_where_none_would_begin_any_more(kind):
+    controller, hand, x, torque = at_rest(kind, max_speed=0.1, max_acceleration=1.0)
+    torque(0.0)
+    hand.target = x + [0.0, 0.0, 0.1]
+    torque(1.0)
+    hand.max_acceleration = None
+    before = torque(1.3)
+    controller.stack.insert(osc.JointTask("joint3"), 5.0, 0.3)
+    assert np.abs(torque(1.3 + DT) - before).max() < 1.0
+
+
+@KINDS
+def test_no_way_begins_at_a_target_that_has_been_left_without_one(kind):
+    _, hand, x, torque = at_rest(kind)
+    torque(0.0)
+    hand.target = x + [0.0, 0.0, 0.1]
+    torque(1.0)
+    torque(5.0)
+    hand.max_acceleration = None
+    hand.target = x
+    before = torque(6.0)
+    hand.max_acceleration = 2.0
+    assert np.abs(torque(6.0 + DT) - before).max() < 1e-6
+
+
 @KINDS
 def test_a_task_that_comes_in_begins_where_it_finds_the_robot(kind):
     robot = osc.load_robot("puma560")
@@ -261,6 +318,10 @@ def test_a_batch_begins_nothing():
     hand = osc.PositionTask(max_speed=0.5, max_acceleration=2.0)
     turn = osc.OrientationTask()
     controller = osc.Controller(robot, osc.Stack([hand, turn, osc.PostureTask()]))
+    hand.target = [0.5, 0.1, 0.3]
+    with pytest.raises(osc.InputError, match="'position' will begin its way where its first tick"):
+        controller.torque_batch([q], [v])
+    hand.target = None
     controller.step(0.0, q, v)
     robot.update(q, v)
     frame = robot.frame_id(robot.tool)

@@ -240,8 +240,8 @@ def check_members(members: tuple[Member, ...]) -> None:
     """Check that compiled code can evaluate the tasks in any state.
 
     Raises:
-        InputError: A task is the user's own, or holds what it finds and has found nothing yet;
-            or there are too many.
+        InputError: A task is the user's own, or holds, or begins with, what it finds and has found
+            nothing yet; or there are too many.
     """
     check_count(members, "a batch")
     for member in members:
@@ -260,6 +260,11 @@ def check_members(members: tuple[Member, ...]) -> None:
             raise InputError(
                 f"task {task.name!r} will hold what it finds at its first tick: give it a target, "
                 "or call step before"
+            )
+        if isinstance(task, TrackingTask) and task.begins_where_found:
+            raise InputError(
+                f"task {task.name!r} will begin its way where its first tick finds the robot: call "
+                "step before"
             )
 
 

@@ -304,8 +304,8 @@ class Controller(ReferenceController):
 
         Raises:
             InputError: A wrong shape or a number that is not finite, with its row; a task or contact
-                that is evaluated in Python, or a task that holds what it will find at its first tick; a
-                robot of the user's own.
+                that is evaluated in Python, or a task that holds, or begins its way with, what it will
+                find at its first tick; a robot of the user's own.
         """
         if t is None:
             t = self.stack.time or 0.0

@@ -28,6 +28,7 @@ from opspace.plan.pack_task import Packed
 from opspace.plan.records import TICK
 from opspace.record.whole_file import whole_file
 from opspace.stack import contact_course
+from opspace.tasks import ForceTask
 
 SOURCES = Path(__file__).parent / "c"
 COLUMNS = {
@@ -41,7 +42,10 @@ COLUMNS = {
     "ANSWER": ("SOLVE",),
 }
 """What the C source must know of `opspace.kernels.columns`, by the array that has it."""
-PRESS = ("GIVEN", "GIVEN_AT", "WANTED", "FORCES", "ON", "KI", "KP", "PRESS_SIZE")
+PRESS = (
+    *("WHEN", "BEGUN", "GIVEN_AT", "FROZEN", "CONFIDENCE", "FLOOR", "GIVEN", "WANTED"),
+    *("FORCES", "OFF", "ON", "KI", "KP", "PRESS_SIZE"),
+)
 """What it must know of `opspace.law.press_columns`."""
 INNER = (
     "space.first_kept",
@@ -307,10 +311,12 @@ def _task(packed: Packed, level: int) -> str:
     kind = packed._tick.kind[packed.index]
     position, rotation, joints = _target(packed, kind)
     rows = packed.rows
-    led = int(getattr(packed.task, "max_acceleration", None) is not None)
+    task = packed.task
+    led = int(getattr(task, "max_acceleration", None) is not None)
+    graded = int(isinstance(task, ForceTask) and not task.thresholds_are_given)
     return (
-        f"{{{_text(packed.task.name)}, {rows.start}, {rows.stop - rows.start}, "
-        f"{position}, {rotation}, {joints}, {level}, {led}}}"
+        f"{{{_text(task.name)}, {rows.start}, {rows.stop - rows.start}, "
+        f"{position}, {rotation}, {joints}, {level}, {led}, {graded}}}"
     )
 
 

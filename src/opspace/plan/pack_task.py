@@ -280,7 +280,7 @@ class Packed:
             or task._target is not self.target
             or task._held is not self.held
             or task._gains is not self.gains
-            or (self._is_led and task.way is not self._way)
+            or (self._is_led and (task.way is not self._way or task._before is not task._target))
         )
 
     @property
@@ -404,6 +404,8 @@ class Packed:
                 self.led.ask(target, FROM_FOUND)
                 self.target, self.held, self._timed = target, held, False
             return
+        elif task._led is not None and task._led.target is target:
+            return  # it goes on to it on a way, though none would begin now
         sample = Sample(goal, target.velocity, target.acceleration)
         self._write(sample, target, held, task._gains)
 

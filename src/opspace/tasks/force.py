@@ -216,6 +216,11 @@ class ForceTask(Task):
         """Forces (off, on) between which the confidence rises, N."""
         return self._between
 
+    @property
+    def thresholds_are_given(self) -> bool:
+        """Whether these stay what they are when it is to press with another force."""
+        return self._thresholds is not None
+
     def bind(self, robot: Robot) -> None:
         """Look up the frame."""
         self.source.bind(robot)
@@ -412,7 +417,7 @@ class ForceTask(Task):
         return self.max_integral * self._scale
 
     def _set_wanted(self, force: Array, moment: Array) -> None:
-        size = float(np.linalg.norm(force))
+        size = math.sqrt(sum(x * x for x in force.tolist()))  # as in C, to the last bit
         if size == 0.0:
             raise InputError(
                 f"task {self.name!r}: a force of zero cannot tell whether it touches; an "

@@ -99,17 +99,17 @@ class TrackingTask(Task):
         max_integral: float = 0.05,
     ) -> None:
         super().__init__(name, rows=rows, units=units, kp=kp, kv=kv, max_speed=max_speed)
+        self._motion_size = motion_size
+        self._before: Target | None = None
+        self._target = Target(Hold(), self._vector(None, ""), self._vector(None, ""))
         self.max_acceleration = max_acceleration
         self._ki = None if ki is None else positive(ki, f"task {name!r}: ki")
         self._max_integral = positive(max_integral, f"task {name!r}: max_integral")
         self._integral: Array | None = None
         self._robot: Robot | None = None
-        self._motion_size = motion_size
         self._held: tuple[Hold, Array] | None = None
         self._followed: Followed | None = None
         self._led: Led | None = None
-        self._before: Target | None = None
-        self._target = Target(Hold(), self._vector(None, ""), self._vector(None, ""))
 
     def bind(self, robot: Robot) -> None:
         """Look up names and sizes on a robot; a second call with the same robot does nothing."""
@@ -211,6 +211,10 @@ class TrackingTask(Task):
         gains = self._gains
         found = paced(value, gains.max_speed, len(self._speed_groups), self.name)
         if found != gains.max_acceleration:
+            if gains.max_acceleration is None and self._before is not self._target:
+                self._before = (
+                    None  # followed before it had none, and left since: none begins there
+                )
             self._gains = replace(gains, max_acceleration=found)
 
     @property
@@ -240,6 +244,13 @@ class TrackingTask(Task):
         """Whether the task will hold what it finds, and has found nothing yet."""
         goal = self._target.goal
         return isinstance(goal, Hold) and (self._held is None or self._held[0] is not goal)
+
+    @property
+    def begins_where_found(self) -> bool:
+        """Whether the way to its target begins where the next tick finds the robot."""
+        target = self._target
+        led = self._gains.max_acceleration is not None and isinstance(target.goal, np.ndarray)
+        return led and self._before is None and not target.velocity.any()
 
     @property
     def target_velocity(self) -> Array:

@@ -238,6 +238,26 @@ double *opspace_press_of(const opspace *c, int task)
     return kind[KIND_KIND] == KIND_FORCE ? c->press + kind[KIND_PRESS] * PRESS_SIZE : NULL;
 }
 
+/* A force task that comes anew begins without contact. */
+void opspace_forget_touch(opspace *c, int task)
+{
+    double *row = opspace_press_of(c, task);
+    if (row) {
+        row[PRESS_BEGUN] = row[PRESS_CONFIDENCE] = 0.0;
+        row[PRESS_FLOOR] = INFINITY;
+    }
+}
+
+/* After a tick that has not come as it should, integrals of forces stay what they are for one more. */
+static void freeze_forces(opspace *c)
+{
+    for (int i = 0; i < c->model->tasks; i++) {
+        double *row = opspace_press_of(c, i);
+        if (row)
+            row[PRESS_FROZEN] = 1.0;
+    }
+}
+
 static int all_measured(const opspace *c)
 {
     for (int i = 0; i < c->model->tasks; i++) {
@@ -271,6 +291,8 @@ static int64_t answered(opspace *c, double t, int64_t found, int64_t answer, dou
         return found | OPSPACE_FAULT;
     }
     int64_t status = found | answer % ANSWER_SOLVE;
+    if (found & ~(int64_t)(OPSPACE_DIRECTION_OFF | OPSPACE_LATE))
+        freeze_forces(c);
     opspace_learn_errors(c, t, status);
     memcpy(tau, c->tau, (size_t)m->n * sizeof *tau);
     without_gravity(c, tau);
@@ -343,6 +365,7 @@ int opspace_set_wrench(opspace *c, int task, double t, const double *wrench)
         return OPSPACE_REFUSED;
     opspace_copy(row + PRESS_GIVEN, wrench, 6);
     row[PRESS_GIVEN_AT] = t;
+    c->heard |= (uint64_t)1 << task;
     return 0;
 }
 
@@ -379,6 +402,7 @@ void opspace_restart(opspace *c)
         opspace_move_contacts(c, 0.0);
         opspace_read_letters(c);
         c->paused = 1;
+        c->heard = 0;
     }
     c->begun = 0;
     opspace_forget_fall(c);

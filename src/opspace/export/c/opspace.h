@@ -28,6 +28,7 @@ typedef struct {
     int joints;      /* or joint positions */
     int level;       /* where it is at first, a place in the levels of the model */
     int led;         /* whether it goes to targets on ways */
+    int graded;      /* whether a new force brings other thresholds of its contact */
 } opspace_task;
 
 /* A contact, as it was exported. */
@@ -151,8 +152,8 @@ int opspace_set_wrench(opspace *controller, int task, double t, const double *wr
 /* Change what a force task presses with, one number for each of its rows, N then N*m.
  *
  * It is approached at the rate that the task was exported with. Returns 0, OPSPACE_NO_TASK or
- * OPSPACE_REFUSED: no force task, a number is not finite, or the force is below the one at which the
- * task is sure of its contact. */
+ * OPSPACE_REFUSED: no force task, a number is not finite, the force is zero, or it is below the one at
+ * which a task with a contact of its own is sure of it; one without has a tenth and four tenths. */
 int opspace_set_force(opspace *controller, int task, const double *force);
 
 /* Let a task come (present is 1) or go (0) from time t on, for so many seconds.

@@ -74,6 +74,7 @@ struct opspace {
     double *state, *last;
     double before;
     int begun, carried, paused;
+    uint64_t heard; /* tasks that have been told a wrench since the last restart, a bit each */
     letter ring[LETTERS];
     double *paper;
     unsigned written, taken;
@@ -116,6 +117,7 @@ struct opspace {
 /* opspace.c: tasks, and numbers. */
 const opspace_task *opspace_task_at(const opspace *c, int task);
 double *opspace_press_of(const opspace *c, int task);
+void opspace_forget_touch(opspace *c, int task);
 int opspace_all_finite(const double *x, int count);
 void opspace_copy(double *to, const double *from, int count);
 

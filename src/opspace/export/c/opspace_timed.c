@@ -47,6 +47,8 @@ static void start(opspace *c, const wish *one, double t)
         if (has_gone(c, one->about, t)) {
             opspace_forget_integral(c, one->about);
             opspace_forget_way(c, one->about);
+            opspace_forget_touch(c, one->about);
+            c->kind[one->about * KIND_SIZE + KIND_REMEMBERS] = 0;
         }
         opspace_send(c->variable + one->about * VARIABLE_SIZE, x[0], t, x[2]);
     }
@@ -75,6 +77,15 @@ void opspace_pause(opspace *c, double pause)
         c->variable[i * VARIABLE_SIZE + START] += pause;
     for (int k = 0; k < c->model->moves; k++)
         c->change[k].ramp[START] += pause;
+    for (int i = 0; i < c->model->tasks; i++) {
+        double *row = opspace_press_of(c, i);
+        if (row) {
+            row[PRESS_WHEN] += pause;
+            /* A wrench that was given after the restart is of the new clock. */
+            if (!(c->heard >> i & 1))
+                row[PRESS_GIVEN_AT] += pause;
+        }
+    }
     for (int i = 0; i < c->timed; i++) {
         c->later[i].order += pause;
         c->later[i].x[1] += pause;

@@ -210,7 +210,7 @@ int opspace_set_force(opspace *c, int task, const double *force)
         return OPSPACE_REFUSED;
     for (int i = 0; i < (int)row[PRESS_FORCES]; i++)
         size += force[i] * force[i];
-    if (sqrt(size) < row[PRESS_ON])
+    if (size == 0.0 || (!one->graded && sqrt(size) < row[PRESS_ON]))
         return OPSPACE_REFUSED;
     unsigned number;
     letter *letter = empty_letter(c, FORCE_LETTER, task, &number);
@@ -282,6 +282,19 @@ int opspace_set_presence(opspace *c, int task, int present, double t, double dur
     return send_three(c, PRESENCE_LETTER, task, present != 0, t, duration);
 }
 
+/* Another force has other thresholds of contact, unless they were given. */
+static void press_with(double *row, const opspace_task *task, const double *force)
+{
+    double size = 0.0;
+    opspace_copy(row + PRESS_WANTED, force, task->rows);
+    for (int i = 0; i < (int)row[PRESS_FORCES]; i++)
+        size += force[i] * force[i];
+    if (task->graded) {
+        row[PRESS_OFF] = 0.1 * sqrt(size);
+        row[PRESS_ON] = 0.4 * sqrt(size);
+    }
+}
+
 static void open_letter(opspace *c, const letter *one)
 {
     const double *x = one->x;
@@ -300,7 +313,7 @@ static void open_letter(opspace *c, const letter *one)
         opspace_copy(c->kv + task->first_row, x + task->rows, task->rows);
         break;
     case FORCE_LETTER:
-        opspace_copy(opspace_press_of(c, one->about) + PRESS_WANTED, x, task->rows);
+        press_with(opspace_press_of(c, one->about), task, x);
         break;
     default:
         opspace_let_touch(c, one->about, x[0] != 0.0, x[1], x[2] != 0.0);
