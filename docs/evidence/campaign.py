@@ -1,7 +1,7 @@
 """What a campaign of `opspace sweep random` found.
 
 ``python docs/evidence/campaign.py results/sweep/random`` writes the tables of docs/safety.md from the
-rows of a sweep, finished or not, and draws docs/images/campaign.png.
+rows of a sweep, finished or not.
 """
 
 import re

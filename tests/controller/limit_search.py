@@ -25,6 +25,9 @@ TICKS, CHANGE = 120, 30
 PASSED = LOST / (osc.JointLimits.k1 * osc.JointLimits.k2)
 """What an acceleration that is wrong by LOST, too little for a word, makes of a position, rad."""
 TOO_FAST = LOST / osc.JointLimits.k2
+OFF_THE_MEAN = 2e-3
+"""The same, rad/s, where several joints are at their speed limits at once: the acceleration in the
+middle of a tick, which the bounds count, is then not its mean."""
 AIMS = ("edge", "speed")
 """What is to be made large: how much faster a joint is than what it can stop from before its limit, or
 than its limit of speed. A joint that goes beyond a limit has been beyond that edge before."""
