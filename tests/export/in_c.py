@@ -46,6 +46,9 @@ class InC:
         i = self.library.opspace_find_task(self.own, task.name.encode())
         return self._call(f"set_{what}", i, *given)
 
+    def restart(self):
+        self.library.opspace_restart(self.own)
+
     def move(self, task, level, t, duration):
         return self._call("move", self._task(task), float(level), t, duration)
 

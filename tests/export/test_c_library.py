@@ -205,7 +205,7 @@ def test_what_cannot_be_used_is_refused_and_changes_nothing(tmp_path):
     assert status == first.status
     np.testing.assert_array_equal(tau, first.tau)
     assert osc.Status(other.step(t + 0.1, q, v)[0]) & osc.Status.TIME_JUMP
-    other.library.opspace_restart(other.own)
+    other.restart()
     assert other.step(t, q, v)[0] == first.status
 
 

@@ -62,7 +62,7 @@ def test_integrals_are_learned_pushed_and_forgotten_alike(name, axes_frame, tmp_
             assert other.set("gains", hand, *gains) == 0
         if k == 180:
             controller.restart()
-            other.library.opspace_restart(other.own)
+            other.restart()
         pause = 3.0 if k >= 180 else 0.0
         command = controller.step(t + pause, q, v)
         status, tau = other.step(t + pause, q, v)

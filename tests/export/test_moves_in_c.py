@@ -40,7 +40,7 @@ class Both:
     def restart(self, clock):
         """Go on with a clock that is so far from the one before."""
         self.controller.restart()
-        self.c.library.opspace_restart(self.c.own)
+        self.c.restart()
         self.clock += clock
         self.run(1)
 

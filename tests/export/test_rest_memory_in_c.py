@@ -23,7 +23,7 @@ def test_memory_is_kept_in_c_through_removals_and_restarts(own_kernels, tmp_path
             assert other.set("presence", hand, 1, t, 0.02) == 0
         if k == 250:
             controller.restart()
-            other.library.opspace_restart(other.own)
+            other.restart()
             pause = 3.0
         command = controller.step(t + pause, here, v)
         status, tau = other.step(t + pause, here, v)

@@ -100,7 +100,7 @@ def test_a_restart_is_no_time_for_a_force_task(tmp_path, clock, heard):
     for _ in range(300):
         both.step()
     both.python.restart()
-    both.c.library.opspace_restart(both.c.own)
+    both.c.restart()
     both.t += clock
     stale = osc.Status.WRENCH_STALE
     both.step(WRENCH if heard else None)

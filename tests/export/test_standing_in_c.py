@@ -162,7 +162,7 @@ def test_a_restart_finds_contacts_where_they_were(tmp_path):
                 controller.stack.remove(one, duration=0.1)
             assert c.touch(one, come, 0.1) == 0
             controller.restart()
-            c.library.opspace_restart(c.own)
+            c.restart()
             clock += 5.0 if come else -3.0
         command, (status, tau) = controller.step(t + clock, q, v), c.step(t + clock, q, v)
         np.testing.assert_array_equal(tau, command.tau, err_msg=f"tick {k}")
@@ -211,7 +211,7 @@ def test_a_robot_that_falls_is_given_up_in_the_same_tick_with_the_same_torque(na
                 controller.stack.insert(contact, 0.0)
                 assert c.touch(contact, 1, 0.0) == 0
             controller.restart()
-            c.library.opspace_restart(c.own)
+            c.restart()
         if 45 <= k < 60:  # turned, and whatever else there is, by more than the tilt
             q[3:7] = np.cos(0.3), np.sin(0.3), 0.0, 0.0
         command, (status, tau) = controller.step(t, q, v), c.step(t, q, v)

@@ -95,7 +95,7 @@ class Both:
 
     def restart(self, clock):
         self.controller.restart()
-        self.c.library.opspace_restart(self.c.own)
+        self.c.restart()
         self.clock += clock
 
     def leave(self, i, duration):

@@ -21,7 +21,7 @@ from opspace.machine.python_call import PythonCalls
 log = logging.getLogger("opspace")
 
 ESTIMATE = "one to two minutes, on a busy machine several"
-"""How long it takes, measured on a shared core: 35 s of it, 36 to 40 in all."""
+"""How long it takes, measured on shared cores: some 80 s of one, up to 180 in all."""
 
 
 class Library:

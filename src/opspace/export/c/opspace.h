@@ -127,9 +127,8 @@ int opspace_find_task(const opspace *controller, const char *name);
  * A task that was exported with a max_acceleration goes there on a way, from what it follows then, within
  * its speed and acceleration; with a velocity that is not zero the target is followed as it is. A target
  * told again is the same way. Returns 0, OPSPACE_NO_TASK or OPSPACE_REFUSED: a number is not finite, or x
- * holds no rotation; or
- * OPSPACE_BUSY, as everything that may be asked from any thread: 64 wishes wait for the next step, or
- * for times of their own. */
+ * holds no rotation; or OPSPACE_BUSY, as everything that may be asked from any thread: 64 wishes wait for
+ * the next step, or for times of their own. */
 int opspace_set_target(
     opspace *controller, int task, const double *x, const double *velocity,
     const double *acceleration);

@@ -200,17 +200,25 @@ int opspace_set_gains(opspace *c, int task, const double *kp, const double *kv)
     return 0;
 }
 
+/* Size of what a force task presses with, without its moments. */
+static double force_of(const double *row, const double *wanted)
+{
+    double size = 0.0;
+    for (int i = 0; i < (int)row[PRESS_FORCES]; i++)
+        size += wanted[i] * wanted[i];
+    return sqrt(size);
+}
+
 int opspace_set_force(opspace *c, int task, const double *force)
 {
     const opspace_task *one = opspace_task_at(c, task);
     if (!one)
         return OPSPACE_NO_TASK;
-    double *row = opspace_press_of(c, task), size = 0.0;
+    const double *row = opspace_press_of(c, task);
     if (!row || !opspace_all_finite(force, one->rows))
         return OPSPACE_REFUSED;
-    for (int i = 0; i < (int)row[PRESS_FORCES]; i++)
-        size += force[i] * force[i];
-    if (size == 0.0 || (!one->graded && sqrt(size) < row[PRESS_ON]))
+    double size = force_of(row, force);
+    if (size == 0.0 || (!one->graded && size < row[PRESS_ON]))
         return OPSPACE_REFUSED;
     unsigned number;
     letter *letter = empty_letter(c, FORCE_LETTER, task, &number);
@@ -285,13 +293,10 @@ int opspace_set_presence(opspace *c, int task, int present, double t, double dur
 /* Another force has other thresholds of contact, unless they were given. */
 static void press_with(double *row, const opspace_task *task, const double *force)
 {
-    double size = 0.0;
     opspace_copy(row + PRESS_WANTED, force, task->rows);
-    for (int i = 0; i < (int)row[PRESS_FORCES]; i++)
-        size += force[i] * force[i];
     if (task->graded) {
-        row[PRESS_OFF] = 0.1 * sqrt(size);
-        row[PRESS_ON] = 0.4 * sqrt(size);
+        row[PRESS_OFF] = 0.1 * force_of(row, force);
+        row[PRESS_ON] = 0.4 * force_of(row, force);
     }
 }
 
