@@ -113,7 +113,7 @@ class Controller(ReferenceController):
 
     Every tick is one call of compiled code, which computes what `ReferenceController` computes; the
     arguments, errors and results are the same. A wheel brings it compiled; elsewhere the first
-    controller compiles it, which takes one to two minutes, and later ones read it from the disk.
+    controller compiles it, which takes about half a minute, and later ones read it from the disk.
 
     Options are fixed when it is built. Stacks of more than some thirty tasks, and contacts of one's own
     class, take the readable form.

@@ -16,7 +16,7 @@ from opspace.machine.processor import Processor
 log = logging.getLogger("opspace")
 
 PROGRAM = """
-import os, pickle, sys
+import gc, os, pickle, sys
 answer, frozen = os.dup(1), sys.stdin.buffer.read()
 os.dup2(2, 1)  # whatever is printed on the way is no part of the object
 sys.path[:] = {path!r}
@@ -28,6 +28,7 @@ from opspace.machine.processor import Processor
 with os.fdopen(answer, "wb") as answer:
     processors = [Processor(*one) for one in {processors!r}]
     pickle.dump(compile_objects(ENTRIES, processors, pickle.loads(frozen)), answer)
+gc.freeze()  # the end of the process need not look through all that was made
 """
 
 

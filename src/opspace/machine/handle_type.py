@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from functools import cache
+from functools import cache, reduce
 from typing import Any
 
 import numpy as np
@@ -21,7 +21,6 @@ from numba.extending import (
     typeof_impl,
     unbox,
 )
-from numba.np.arrayobj import make_array, populate_array
 from numba.np.numpy_support import from_dtype
 
 from opspace.machine.field_table import RecordTable
@@ -107,14 +106,23 @@ def _field(context: Any, builder: Any, kind: HandleType, value: Any, name: str) 
 
 def array_at(context: Any, builder: Any, kind: Any, address: Any, shape: list[Any]) -> Any:
     """Make an array, which is not counted, of an address and a shape."""
-    array = make_array(kind)(context, builder)
     itemsize = ir.Constant(cgutils.intp_t, WORD)
     strides = [itemsize]
     for extent in reversed(shape[1:]):
         strides.insert(0, builder.mul(strides[0], extent))
-    data = builder.bitcast(address, array.data.type)
-    populate_array(array, data, shape, strides, itemsize, meminfo=None)
-    return array._getvalue()
+    model = context.data_model_manager[kind]
+    kind_of_array: Any = model.get_value_type()
+    array = ir.Constant(kind_of_array, None)
+    pointer = kind_of_array.elements[model.get_field_position("data")]
+    for name, value in (
+        ("nitems", reduce(builder.mul, shape)),
+        ("itemsize", itemsize),
+        ("data", builder.bitcast(address, pointer)),
+        ("shape", cgutils.pack_array(builder, shape)),
+        ("strides", cgutils.pack_array(builder, strides)),
+    ):
+        array = model.set(builder, array, value, name)
+    return array
 
 
 @unbox(HandleType)

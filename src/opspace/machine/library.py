@@ -20,7 +20,7 @@ from opspace.machine.python_call import PythonCalls
 
 log = logging.getLogger("opspace")
 
-ESTIMATE = "one to two minutes, on a busy machine several"
+ESTIMATE = "about half a minute, on a busy machine more"
 """How long it takes, measured on shared cores: some 80 s of one, up to 180 in all."""
 
 

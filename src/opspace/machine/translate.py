@@ -5,51 +5,47 @@
 
 from __future__ import annotations
 
+import gc
 from typing import Any
 
-from llvmlite import binding as llvm
-from numba.core import cgutils
+from numba.core import cgutils, fastmathpass, types
 from numba.core.codegen import CodeLibrary
+from numba.core.cpu_options import FastMathOptions
 from numba.core.registry import cpu_target
 from numba.cpython import slicing
 
+from opspace.machine import array_elements  # noqa: F401 - numba learns how to read an element
+from opspace.machine.jit import FAST
+
 
 class Translation(CodeLibrary):
-    """What numba made of one function, and of those that it calls, left as it is.
+    """What numba made of one function; all of them lie in one module, as they came.
 
     By itself numba links every function to all that it calls, optimises the whole and emits it.
     """
 
-    def __init__(self, codegen: Any, name: str) -> None:
-        super().__init__(codegen, name)
-        self._parts: list[str] = []
-        self._others: list[Translation] = []
+    def create_ir_module(self, name: str) -> Any:
+        """Return the module that all have in common."""
+        codegen: Any = self.codegen
+        if not hasattr(codegen, "whole"):
+            codegen.whole = codegen._create_empty_module("whole")
+        return codegen.whole
 
     def add_linking_library(self, library: Translation) -> None:
-        """Remember a function that is called."""
-        self._others.append(library)
+        """Do nothing: it lies in the module."""
 
     def add_ir_module(self, ir_module: Any) -> None:
-        """Take what was translated."""
-        self._parts.append(cgutils.normalize_ir_text(str(ir_module)))
+        """Do nothing: it is the module."""
 
     def finalize(self) -> None:
         """Do nothing with it."""
         self._finalized = True
 
     def get_llvm_str(self) -> str:  # pyright: ignore[reportIncompatibleMethodOverride]
-        """Return the function with all that it calls, each once."""
-        whole = llvm.parse_assembly("")
-        found: set[Translation] = {self}
-        waiting: list[Translation] = [self]
-        while waiting:
-            one = waiting.pop()
-            for part in one._parts:
-                whole.link_in(llvm.parse_assembly(part))
-            new = [other for other in dict.fromkeys(one._others) if other not in found]
-            found.update(new)
-            waiting += new
-        return str(whole)
+        """Return all that was translated, each function once."""
+        whole = self.create_ir_module("")
+        fastmathpass.rewrite_module(whole, FastMathOptions(FAST))
+        return cgutils.normalize_ir_text(str(whole))
 
     def get_function(self, name: str) -> Any:
         """Refuse: there is no code."""
@@ -62,11 +58,14 @@ class Translation(CodeLibrary):
 
 def translate_only() -> None:
     """Have numba translate only, as long as this process lives."""
+    gc.disable()  # all that is made is kept to the end: looking for rubbish takes a quarter more
     context: Any = cpu_target.target_context
     context.codegen()._library_class = Translation
     context.create_cpython_wrapper = context.create_cfunc_wrapper = _nothing
+    context.post_lowering = _nothing  # it would go through the whole module after each function
     context.get_executable = lambda *args: [].append  # a key of its own for each function
     slicing.fix_index = _as_it_is
+    types.functions.BaseFunction.get_call_type = _resolved_once
 
 
 def _nothing(*args: Any, **options: Any) -> None:
@@ -76,3 +75,15 @@ def _nothing(*args: Any, **options: Any) -> None:
 def _as_it_is(builder: Any, index: Any, size: Any) -> Any:
     """Kernels never count from the end: a negative index would be an error, not the last element."""
     return index
+
+
+_resolve = types.functions.BaseFunction.get_call_type
+
+
+def _resolved_once(self: Any, context: Any, args: Any, kws: Any) -> Any:
+    """Ask once which overload takes arguments of some types: a plus has dozens."""
+    known = vars(self).setdefault("known_calls", {})
+    asked = (args, *kws.items())
+    if asked not in known:
+        known[asked] = _resolve(self, context, args, kws)
+    return known[asked]
