@@ -17,9 +17,11 @@ from opspace.kernels.columns import (
     PERIOD,
 )
 from opspace.kernels.compiled_scalars import (
+    allowed_speed,
+    buffer_command,
     last_command,
-    limit_command,
     limit_presence,
+    position_command,
     stopping_command,
 )
 from opspace.kernels.distances import approach, will_close
@@ -56,12 +58,15 @@ def begin_limits(work):
     """Evaluate what every limit asks for or allows, rad/s², into its row of ``limit`` (limits, 11)."""
     for i in range(work.limit.shape[0]):
         limit = work.limit[i]
-        limit[COMMAND] = _command(work, i, limit[SPEED])
-        limit[BY_POSITION] = _command(work, i, math.inf) - limit[DISTURBANCE]
         limit[HASTE], limit[LAST], limit[SHIFT] = 0.0, math.inf, 0.0
+        d = distance_to_limit(work, i)
+        towards = limit[SIGN] * work.v[work.limit_joint[i]]
         if work.option[LIMIT_BOUND] != 0.0:
-            stop(work, i)
+            _bound(work, i, d, towards)
+        else:
+            _ask(work, i, d, towards)
         limit[COMMAND] -= limit[DISTURBANCE]
+        limit[BY_POSITION] -= limit[DISTURBANCE]
         limit[LAST] -= limit[DISTURBANCE]
 
 
@@ -73,32 +78,32 @@ def distance_to_limit(work, i):
 
 
 @jit
-def _command(work, i, speed):
-    """What limit i asks for or allows, of a joint that may be so fast."""
+def _ask(work, i, d, towards):
+    """What the task set of limit i asks for."""
     option, limit = work.option, work.limit[i]
-    return limit_command(
-        int(option[LIMIT_LAW]),
-        distance_to_limit(work, i),
-        limit[SIGN] * work.v[work.limit_joint[i]],
-        limit[BRAKE],
-        speed,
-        option[LIMIT_K1],
-        option[LIMIT_K2],
-        option[LIMIT_KP],
-        option[LIMIT_BUFFER],
-    )
+    limit[COMMAND] = limit[BY_POSITION] = buffer_command(
+        d, towards, limit[BRAKE], limit[SPEED],
+        option[LIMIT_K1], option[LIMIT_K2], option[LIMIT_KP], option[LIMIT_BUFFER],
+    )  # fmt: skip
 
 
 @jit
-def stop(work, i):
+def _bound(work, i, d, towards):
+    """What limit i allows."""
+    limit, k2 = work.limit[i], work.option[LIMIT_K2]
+    allowed, slope = allowed_speed(d, limit[BRAKE], work.option[LIMIT_K1])
+    by_position = position_command(towards, allowed, slope, k2)
+    limit[BY_POSITION] = by_position
+    limit[COMMAND] = min(by_position, k2 * (limit[SPEED] - towards))
+    if towards > max(allowed, 0.0):
+        _stop(work, i, d, towards)
+
+
+@jit
+def _stop(work, i, d, towards):
     """Ask more of a joint that is too fast, as much as its motors give while they hold the others."""
     k1, period = work.option[LIMIT_K1], work.option[PERIOD]
     limit, j = work.limit[i], work.limit_joint[i]
-    d, towards = distance_to_limit(work, i), limit[SIGN] * work.v[j]
-    if towards <= 0.0:
-        return
-    if stopping_command(d, towards, limit[BRAKE], math.inf, k1, period) == math.inf:
-        return
     limit[LAST] = last_command(d, towards, limit[BRAKE], k1)
     most = math.inf
     for a in range(work.v.shape[0]):

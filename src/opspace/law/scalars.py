@@ -332,7 +332,19 @@ def admissible_command(
 ) -> float:  # fmt: skip
     """Evaluate q̈_adm at distance d and speed ``towards``, for the largest speed ``most``."""
     allowed, slope = allowed_speed(d, brake, k1)
-    return min(-towards * slope + k2 * (allowed - towards), k2 * (most - towards))
+    return min(position_command(towards, allowed, slope, k2), k2 * (most - towards))
+
+
+def position_command(towards: float, allowed: float, slope: float, k2: float) -> float:
+    """Evaluate q̈_adm of a joint that may be as fast as it likes far from its limit.
+
+    Args:
+        towards: Speed towards the limit.
+        allowed: v_adm(d), see `allowed_speed`.
+        slope: dv_adm/dd.
+        k2: With which the speed goes to v_adm, 1/s.
+    """
+    return -towards * slope + k2 * (allowed - towards)
 
 
 def closing_command(
@@ -480,16 +492,6 @@ LIMIT_LAWS: Mapping[str, LimitLaw] = MappingProxyType(
 )
 """``admissible``: a bound on what the stack may ask for, the most that the joint can still brake.
 ``buffer``: a task set, active by position near the limit, as in Section 4.2 of the paper."""
-
-
-def limit_command(
-    code: int, d: float, towards: float, brake: float, most: float,
-    k1: float, k2: float, kp: float, buffer: float,
-) -> float:  # fmt: skip
-    """Evaluate the command of the law with this code."""
-    if code == BUFFER:
-        return buffer_command(d, towards, brake, most, k1, k2, kp, buffer)
-    return admissible_command(d, towards, brake, most, k1, k2, kp, buffer)
 
 
 def limit_presence(

@@ -159,6 +159,7 @@ def _define(entry: KernelEntry, found: Any, context: Any, module: Any) -> None:
 def _optimise(module: Any, machine: Any, *, vectorise: bool) -> None:
     options = llvm.create_pipeline_tuning_options(speed_level=2)
     options.loop_vectorization = vectorise
+    options.loop_interleaving = False  # rows are too short for two vectors at once
     options.slp_vectorization = False
     builder = llvm.create_pass_builder(machine, options)
     passes = builder.getModulePassManager()
