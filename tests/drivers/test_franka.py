@@ -23,6 +23,8 @@ if not PYTHON:
     )
 WHERE = "import franka_sim; print(franka_sim.__file__)"
 
+ROUNDS = 5
+"""How often all changes are made, of 12 s each."""
 REFLEX_FREE = ["--enforce-comm-constraints", "--enforce-motion-limits"]
 
 
@@ -73,7 +75,7 @@ def controller_of(model, gravity="robot"):
     posture = osc.PostureTask(kp=25.0, max_speed=0.5)
     # The arm takes less speed near the ends of its joints; the model says nothing of speeds.
     speeds = dict.fromkeys(robot.joint_names, 1.5)
-    limits = osc.JointLimits(clearance=0.02, speeds=speeds)
+    limits = osc.JointLimits(clearance=0.03, brake_acceleration=1.5, speeds=speeds)
     stack = osc.Stack([turn, hand, posture], limits=limits)
     controller = osc.Controller(
         robot,
@@ -116,13 +118,16 @@ def test_no_reflex_whatever_tasks_and_targets_do(arm_apart, model, driver):
         real_time=osc.RealTime(),
         stop_on=osc.Status.FAULT,
     )
+    stack, turn = controller.stack, controller.stack["orientation"]
+    guest.target = controller.robot.q_upper[3]
     with loop:
         at = controller.robot.position("link7").copy()
-        for change in (
+        for change in ROUNDS * (
             lambda: setattr(hand, "target", at + [0.1, 0.2, 0.1]),
-            lambda: controller.stack.insert(guest, level=-1, duration=0.3),
+            lambda: stack.insert(guest, level=-1, duration=0.3),
             lambda: setattr(hand, "target", at + [1.0, 0.0, 0.3]),  # beyond its reach
-            lambda: controller.stack.remove(guest, duration=0.3),
+            lambda: stack.remove(guest, duration=0.3),
+            lambda: stack.swap(turn, hand, duration=0.3),
             lambda: setattr(hand, "target", at),
         ):
             change()
