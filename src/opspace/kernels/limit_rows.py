@@ -18,8 +18,8 @@ from opspace.kernels.columns import (
 )
 from opspace.kernels.compiled_scalars import (
     allowed_speed,
-    buffer_command,
     last_command,
+    limit_command,
     limit_presence,
     position_command,
     stopping_command,
@@ -43,7 +43,7 @@ from opspace.kernels.limit_columns import (
 from opspace.kernels.projection import nearest_acceleration, task_metric
 from opspace.kernels.room_below import leave_room
 from opspace.kernels.task_rows import joint_position
-from opspace.law.scalars import BROKEN, LOOKS, LOST, SEEN, UNBOUNDED
+from opspace.law.scalars import ADMISSIBLE, BROKEN, LOOKS, LOST, SEEN, UNBOUNDED
 from opspace.machine.jit import jit
 
 FILTERED = int(Status.FILTERED)
@@ -56,15 +56,25 @@ SCALED = int(Status.TORQUE_SCALED)
 @jit
 def begin_limits(work):
     """Evaluate what every limit asks for or allows, rad/s², into its row of ``limit`` (limits, 11)."""
+    code = int(work.option[LIMIT_LAW])
     for i in range(work.limit.shape[0]):
         limit = work.limit[i]
         limit[HASTE], limit[LAST], limit[SHIFT] = 0.0, math.inf, 0.0
         d = distance_to_limit(work, i)
         towards = limit[SIGN] * work.v[work.limit_joint[i]]
+        allowed, slope = math.inf, 0.0
         if work.option[LIMIT_BOUND] != 0.0:
-            _bound(work, i, d, towards)
+            allowed, slope = allowed_speed(d, limit[BRAKE], work.option[LIMIT_K1])
+        if code == ADMISSIBLE:
+            k2 = work.option[LIMIT_K2]
+            by_position = position_command(towards, allowed, slope, k2)
+            limit[BY_POSITION] = by_position
+            limit[COMMAND] = min(by_position, k2 * (limit[SPEED] - towards))
         else:
-            _ask(work, i, d, towards)
+            limit[BY_POSITION] = _command(work, i, code, d, towards, math.inf)
+            limit[COMMAND] = _command(work, i, code, d, towards, limit[SPEED])
+        if towards > max(allowed, 0.0):
+            _stop(work, i, d, towards)
         limit[COMMAND] -= limit[DISTURBANCE]
         limit[BY_POSITION] -= limit[DISTURBANCE]
         limit[LAST] -= limit[DISTURBANCE]
@@ -78,25 +88,13 @@ def distance_to_limit(work, i):
 
 
 @jit
-def _ask(work, i, d, towards):
-    """What the task set of limit i asks for."""
-    option, limit = work.option, work.limit[i]
-    limit[COMMAND] = limit[BY_POSITION] = buffer_command(
-        d, towards, limit[BRAKE], limit[SPEED],
+def _command(work, i, code, d, towards, speed):
+    """What limit i asks for or allows by any law, of a joint that may be so fast."""
+    option = work.option
+    return limit_command(
+        code, d, towards, work.limit[i, BRAKE], speed,
         option[LIMIT_K1], option[LIMIT_K2], option[LIMIT_KP], option[LIMIT_BUFFER],
     )  # fmt: skip
-
-
-@jit
-def _bound(work, i, d, towards):
-    """What limit i allows."""
-    limit, k2 = work.limit[i], work.option[LIMIT_K2]
-    allowed, slope = allowed_speed(d, limit[BRAKE], work.option[LIMIT_K1])
-    by_position = position_command(towards, allowed, slope, k2)
-    limit[BY_POSITION] = by_position
-    limit[COMMAND] = min(by_position, k2 * (limit[SPEED] - towards))
-    if towards > max(allowed, 0.0):
-        _stop(work, i, d, towards)
 
 
 @jit

@@ -494,6 +494,16 @@ LIMIT_LAWS: Mapping[str, LimitLaw] = MappingProxyType(
 ``buffer``: a task set, active by position near the limit, as in Section 4.2 of the paper."""
 
 
+def limit_command(
+    code: int, d: float, towards: float, brake: float, most: float,
+    k1: float, k2: float, kp: float, buffer: float,
+) -> float:  # fmt: skip
+    """Evaluate the command of the law with this code."""
+    if code == BUFFER:
+        return buffer_command(d, towards, brake, most, k1, k2, kp, buffer)
+    return admissible_command(d, towards, brake, most, k1, k2, kp, buffer)
+
+
 def limit_presence(
     code: int, d: float, towards: float, brake: float, buffer: float, profile_code: int
 ) -> float:
