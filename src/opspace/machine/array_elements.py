@@ -1,7 +1,7 @@
 """How an element of an array is read and written by code that numba translates for others.
 
-Numba's own way, which knows every layout and every index, has seven times the instructions, and
-whoever optimises them takes most of the time that compiling takes.
+Numba's own way, which knows every layout and every index, has seven times the instructions, and each
+of them has to be made, written, read and optimised.
 """
 
 # numba's own modules have no type stubs.
