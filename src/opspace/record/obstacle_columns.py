@@ -225,14 +225,18 @@ class ObstaclePlayer:
                 raise RecordingError(f"{where} does not tell what obstacle {name!r} is") from None
 
     def put(self, row: int) -> None:
-        """Put them where they were in one tick."""
+        """Put them where they were in one tick, after the tick before it.
+
+        Who comes again is the last, as it was then: sums over obstacles have the order of these.
+        """
         if self._rows is None or self._guard is None:
             return
         placings, guard = self._rows[row], self._guard
-        present = [obstacle.name for obstacle in guard.obstacles]
-        if present != list(placings):
-            guard.remove(*present)
-            guard.add(*(self._known[name] for name in placings))
+        present = {obstacle.name for obstacle in guard.obstacles}
+        if gone := present - placings.keys():
+            guard.remove(*gone)
+        if new := [name for name in placings if name not in present]:
+            guard.add(*(self._known[name] for name in new))
         for name, placing in placings.items():
             self._known[name].put_back(placing)
 
