@@ -47,7 +47,7 @@ class InC:
         return self._call(f"set_{what}", i, *given)
 
     def restart(self):
-        self.library.opspace_restart(self.own)
+        self._call("restart")
 
     def move(self, task, level, t, duration):
         return self._call("move", self._task(task), float(level), t, duration)

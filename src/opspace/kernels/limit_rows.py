@@ -65,7 +65,7 @@ def begin_limits(work):
         allowed, slope = math.inf, 0.0
         if work.option[LIMIT_BOUND] != 0.0:
             allowed, slope = allowed_speed(d, limit[BRAKE], work.option[LIMIT_K1])
-        if code == ADMISSIBLE:
+        if code == ADMISSIBLE:  # the usual law; both commands from one v_adm, which costs most
             k2 = work.option[LIMIT_K2]
             by_position = position_command(towards, allowed, slope, k2)
             limit[BY_POSITION] = by_position

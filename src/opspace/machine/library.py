@@ -21,7 +21,7 @@ from opspace.machine.python_call import PythonCalls
 log = logging.getLogger("opspace")
 
 ESTIMATE = "about half a minute, on a busy machine more"
-"""How long it takes, measured on shared cores: some 80 s of one, up to 180 in all."""
+"""How long it takes, measured on a shared core: 24 to 30 s of it."""
 
 
 class Library:
