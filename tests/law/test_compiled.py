@@ -14,6 +14,7 @@ from opspace.kernels.walk import begin, pass_on, slot_bit, walk
 from opspace.law import SigmaBuffer, TaskSet, blended_torque, corners
 from opspace.law.activation import PROFILES, Profile, Ramp
 from opspace.law.hierarchy import whiten
+from opspace.machine.lanes import whole
 from opspace.plan.memory import Sizes, make_inertia
 from opspace.plan.records import SPACE
 from tests.budget import examples
@@ -62,9 +63,10 @@ def compiled_torque(L, tasks, blend, buffer):
     pass_on(0, n, s)
     space.path[1] = 1.0
     u = np.zeros(n)
+    J = np.zeros((row, whole(n)))
+    J[:, :n] = np.concatenate([np.zeros((0, n)), *(whitened[k].J for k in order)])
     walk(
-        1, levels, n, np.array(slots, np.int64).reshape(-1, 3),
-        np.concatenate([np.zeros((0, n)), *(whitened[k].J for k in order)]),
+        1, levels, n, np.array(slots, np.int64).reshape(-1, 3), J,
         np.concatenate([np.zeros(0), *(whitened[k].f for k in order)]),
         masks, weights, count, np.zeros(n + 1), buffer, s, u,
     )  # fmt: skip

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from opspace.kernels.columns import OPTION_SIZE
 from opspace.machine.field_table import LIVES, WRITERS
 from opspace.machine.jit import UNCOUNTED
+from opspace.machine.lanes import LANES
 from opspace.plan.memory import Reported, Sizes, make_tick
 from opspace.plan.records import BOUNDS, INERTIA, SIZES, SPACE, TABLES, TICK
 from opspace.robots import load_robot
@@ -62,13 +63,19 @@ def test_compiled_code_reads_and_writes_every_field(table):
         np.testing.assert_array_equal(array, expected, err_msg=field.name)
 
 
+def extent(size, sizes):
+    """What a size in a shape comes to."""
+    found = eval(re.sub(r"(\d) ", r"\1 * ", size.removeprefix("whole ")), {}, sizes)
+    return -(-found // LANES) * LANES if size.startswith("whole ") else found
+
+
 @by_table
 @given(numbers=st.lists(st.integers(0, 5), min_size=len(SIZES), max_size=len(SIZES)))
 @settings(max_examples=20)
 def test_arrays_have_the_shape_type_and_start_of_their_fields(table, numbers):
     sizes = dict(zip(SIZES, numbers, strict=True))
     for field, array in arrays_of(table, made(table, sizes)):
-        shape = [eval(re.sub(r"(\d) ", r"\1 * ", str(x)), {}, sizes) for x in field.shape]
+        shape = [extent(str(size), sizes) for size in field.shape]
         assert (array.shape, array.dtype) == (tuple(shape), field.dtype), field.name
         assert (array == field.start).all(), field.name
 
@@ -90,18 +97,19 @@ def test_every_record_within_a_record_is_a_table_of_its_own():
 
 
 def test_what_is_given_is_shared_and_tells_the_sizes_that_are_not_said():
-    U = np.ones((4, 4))
-    record = INERTIA.make({}, {"U": U})
-    assert record.U is U
-    assert record.inverse.shape == record.end.shape == (4,)
+    L = np.ones((4, 8))
+    record = INERTIA.make({}, {"end": np.ones(4, np.int64), "L": L})
+    assert record.L is L
+    assert record.before.shape == record.end.shape == (4,)
+    assert record.white.shape == (4, 8)
 
 
 @pytest.mark.parametrize(
     ("given_", "offender"),
     [
-        ({"V": np.zeros((3, 3))}, "'V'.*U, inverse, before, end"),
-        ({"U": np.zeros((3, 2))}, r"Inertia\.U"),
-        ({"U": np.zeros(3)}, r"Inertia\.U"),
+        ({"V": np.zeros((3, 3))}, "'V'.*L, white, spare, product, before, start, end"),
+        ({"L": np.zeros((3, 3))}, r"Inertia\.L"),
+        ({"L": np.zeros(3)}, r"Inertia\.L"),
         ({"end": np.zeros(3)}, r"Inertia\.end.*float64"),
         ({"end": np.zeros(2, np.int64)}, r"Inertia\.end"),
         ({"end": made(BOUNDS)}, r"Inertia\.end is Bounds"),
@@ -162,7 +170,7 @@ def test_a_tick_shares_with_its_walk_and_its_robot():
 
 def test_a_record_shows_its_fields_and_has_no_others():
     record = made(INERTIA)
-    assert repr(record) == "Inertia(U, inverse, before, end)"
+    assert repr(record) == "Inertia(L, white, spare, product, before, start, end)"
     assert [x is getattr(record, f.name) for x, f in zip(record, INERTIA.fields, strict=True)]
     with pytest.raises(AttributeError):
         record.inverted

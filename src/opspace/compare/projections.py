@@ -115,7 +115,7 @@ class AnotherProjection(Controller):
 
     def _wish(self, plan: Plan, command: Command) -> Wanted:
         tick, limits = plan.tick, self.stack.limits
-        U, balance = np.array(tick.inertia.U), np.array(tick.balance)
+        U, balance = np.array(tick.inertia.L)[:, : tick.v.size].T, np.array(tick.balance)
         keeps = bool(tick.option[KEEP_TORQUE] != 0.0)
         # A tick that has nothing to keep does not say what it wanted: it did it.
         kept = keeps or len(tick.distance) > 0 or (limits is not None and limits.law.bound)
@@ -209,7 +209,7 @@ def _metric(plan: Plan, command: Command, n: int) -> np.ndarray:
         for (level, i, _), (_, first, rows) in zip(plan.places, tick.slots.tolist(), strict=True):
             if level == number:
                 h = shares[plan.members[i].task.name].get(level, 0.0)
-                J = np.array(tick.Jw[first : first + rows])
+                J = np.array(tick.Jw[first : first + rows, :n])
                 W += level_weight(below) * h * J.T @ J
                 absent *= 1.0 - h
         below += 1.0 - absent

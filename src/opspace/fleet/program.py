@@ -15,6 +15,7 @@ from opspace.fleet.kernels_in_cpp import translate
 from opspace.fleet.layout import LANES, RobotLayout
 from opspace.fleet.led_targets import IN_TICK, WITHOUT_WAYS
 from opspace.fleet.no_integrals import WITHOUT
+from opspace.fleet.one_by_one import ONE_BY_ONE
 from opspace.fleet.one_robot import robot_tick
 from opspace.fleet.precision import constants_of
 from opspace.fleet.robot_record import ROBOT, WAYS
@@ -243,7 +244,12 @@ def _row(array: str) -> str:
 
 @cache
 def _translated(dtype: str, given: bool, integrates: bool, paced: bool) -> tuple[str, str]:
-    instead = {**IN_TICK, **(INSTEAD if given else {}), **({} if integrates else WITHOUT)}
+    instead = {
+        **IN_TICK,
+        **ONE_BY_ONE,
+        **(INSTEAD if given else {}),
+        **({} if integrates else WITHOUT),
+    }
     if not paced:
         instead |= WITHOUT_WAYS
     if dtype == "float32":

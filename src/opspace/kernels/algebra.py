@@ -4,6 +4,19 @@ from __future__ import annotations
 
 import math
 
+from opspace.kernels.whole_vectors import (
+    add,
+    clear_after,
+    clear_before,
+    combine,
+    copy,
+    dot,
+    put,
+    put_at,
+    put_unit,
+    whole,
+    whole_before,
+)
 from opspace.machine.jit import jit
 
 SWEEPS = 30
@@ -69,84 +82,71 @@ def solve_lower_transposed(L, n, x):
 
 
 @jit
-def householder(B, m, r, scale, R):
-    """Factor Bᵀ = Q R for the rows of B (m <= r): each row becomes a reflector, R (m, m) upper.
+def householder(B, m, r, scale, L):
+    """Factor B = L Qᵀ for the rows of B (m <= r): each row becomes a reflector, L (m, m) lower.
 
     Args:
-        B: (m, r) rows on entry; on return row k holds reflector k in its entries k and beyond.
+        B: (m, r) rows on entry, padded with zeros; on return row k holds reflector k, zeros before it.
         m: Number of rows.
         r: Length of the rows.
         scale: (m,) filled with 2/‖reflector‖², 0 where nothing is reflected.
-        R: (m, m) filled, upper triangle.
+        L: (m, m) filled, its rows padded with zeros.
     """
+    end = whole(r)
     for k in range(m):
-        norm2 = 0.0
-        for a in range(k, r):
-            norm2 += B[k, a] * B[k, a]
-        for i in range(k):
-            R[i, k] = B[k, i]
+        row, first = B[k], whole_before(k)
+        copy(row, L[k], 0, whole(k + 1))
+        clear_after(L[k], k + 1, whole(m))
+        clear_before(row, k)
+        norm2 = dot(row, row, first, end)
         norm = math.sqrt(norm2)
         if norm == 0.0:
             scale[k] = 0.0
-            R[k, k] = 0.0
+            put_at(0.0, k, L[k])
             continue
-        pivot = B[k, k]
+        pivot = row[k]
         alpha = -norm if pivot > 0.0 else norm
-        B[k, k] = pivot - alpha
+        put_at(pivot - alpha, k, row)
         # ‖reflector‖² = 2 ‖row‖ (‖row‖ + |pivot|), which cannot cancel.
         scale[k] = 1.0 / (norm * (norm + abs(pivot)))
-        R[k, k] = alpha
+        put_at(alpha, k, L[k])
         for i in range(k + 1, m):
-            s = 0.0
-            for a in range(k, r):
-                s += B[k, a] * B[i, a]
-            s *= scale[k]
-            for a in range(k, r):
-                B[i, a] -= s * B[k, a]
+            add(-scale[k] * dot(row, B[i], first, end), row, B[i], first, end)
 
 
 @jit
 def apply_reflectors(B, m, r, scale, x):
-    """Overwrite x (r,) with Q x, Q the product of the reflectors in B."""
+    """Overwrite x (r,) with Q x, Q the product of the reflectors in B; x is padded as its rows."""
+    end = whole(r)
     for k in range(m - 1, -1, -1):
-        s = 0.0
-        for a in range(k, r):
-            s += B[k, a] * x[a]
-        s *= scale[k]
-        for a in range(k, r):
-            x[a] -= s * B[k, a]
+        first = whole_before(k)
+        add(-scale[k] * dot(B[k], x, first, end), B[k], x, first, end)
 
 
 @jit
 def apply_reflectors_transposed(B, m, r, scale, x):
-    """Overwrite x (r,) with Qᵀ x, Q the product of the reflectors in B."""
+    """Overwrite x (r,) with Qᵀ x, Q the product of the reflectors in B; x is padded as its rows."""
+    end = whole(r)
     for k in range(m):
-        s = 0.0
-        for a in range(k, r):
-            s += B[k, a] * x[a]
-        s *= scale[k]
-        for a in range(k, r):
-            x[a] -= s * B[k, a]
+        first = whole_before(k)
+        add(-scale[k] * dot(B[k], x, first, end), B[k], x, first, end)
 
 
 @jit
-def solve_upper(R, m, x):
-    """Overwrite x (m,) with R⁻¹ x."""
-    for i in range(m - 1, -1, -1):
-        s = x[i]
-        for k in range(i + 1, m):
-            s -= R[i, k] * x[k]
-        x[i] = s / R[i, i]
+def invert_lower(L, m, X):
+    """Fill X (m, m) with the inverse of L, lower; the rows of both are padded with zeros.
 
-
-@jit
-def solve_upper_transposed(R, m, x):
-    """Overwrite x (m,) with R⁻ᵀ x."""
+    Returns:
+        ‖X‖², by Frobenius; no number where L is singular.
+    """
+    size = 0.0
     for i in range(m):
-        s = x[i]
-        for k in range(i):
-            s -= R[k, i] * x[k]
-        x[i] = s / R[i, i]
+        row, inverse, end = X[i], 1.0 / L[i, i], whole(i + 1)
+        put_unit(-1.0, i, row, whole(m))
+        combine(L[i], X, 0, i, row, 0, end)
+        put(-inverse, row, row, 0, end)
+        size += dot(row, row, 0, end)
+    return size
 
 
 @jit

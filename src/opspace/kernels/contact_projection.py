@@ -30,6 +30,7 @@ from opspace.kernels.stance_columns import (
     PLACE_FIRST,
     PLACE_ROWS,
 )
+from opspace.kernels.whole_vectors import whole
 from opspace.law.scalars import (
     BROKEN,
     CLEANINGS,
@@ -210,10 +211,12 @@ def _equations(work, free, size):
             E[b, k] = stance.torques[k, b]
         for i in range(stance.rows[0]):
             E[b, free + i] = -stance.J[i, b] * stance.loose[i]
-    householder(E, BASE_SIZE, size, stance.scale, stance.R)
+        for k in range(size, whole(size)):
+            E[b, k] = 0.0
+    householder(E, BASE_SIZE, size, stance.scale, stance.lower)
     for i in range(BASE_SIZE):
         for j in range(BASE_SIZE):
-            X[i, j] = stance.R[i, j] if j >= i else 0.0
+            X[i, j] = stance.lower[j, i] if j >= i else 0.0
     singular_values(X, BASE_SIZE, BASE_SIZE, stance.turned, stance.sigma)
     for a in range(BASE_SIZE):
         stance.start[a] = 0.0

@@ -39,7 +39,7 @@ def evaluate_contacts(work):
         for i in range(end - first):
             part = component_of(end - first, i)
             _row(work, c, first + i, 3 * (part // 3), part % 3)
-        whiten_rows(work.inertia, joint, first, end, stance.Jw)
+        whiten_rows(work.inertia, joint, first, end, stance.J, stance.Jw)
 
 
 @jit
@@ -94,8 +94,6 @@ def _row(work, c, row, block, axis):
         for a in range(n):
             into[a] += factor * J[block + k, a]
     work.stance.wanted[row] = -STILLING * rate - drift
-    for a in range(n):
-        work.stance.Jw[row, a] = into[a]
 
 
 @jit

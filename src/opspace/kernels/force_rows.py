@@ -8,7 +8,6 @@ from opspace.command import Status
 from opspace.kernels.columns import (
     FIRST_ROW,
     FORCE,
-    JOINT,
     KIND,
     PRESS,
     ROWS,
@@ -23,7 +22,7 @@ from opspace.kernels.compiled_scalars import (
     lag,
     passed,
 )
-from opspace.kernels.inertia import whiten_rows
+from opspace.kernels.inertia import whiten
 from opspace.kernels.motion import A, P, V, cross_add, measure, move_joints, selected
 from opspace.law.press_columns import (
     AHEAD,
@@ -300,7 +299,7 @@ def _approach(work, i, row, size):
             row[AHEAD + k] += part * work.press_axes[r, k]
         for a in range(n):
             work.Jw[first, a] += part * work.J[first + r, a]
-    whiten_rows(work.inertia, work.kind[i, JOINT], first, first + 1, work.Jw)
+    whiten(work.inertia, work.Jw[first])
     sigma, travel = 0.0, 0.0
     for a in range(n):
         sigma += work.Jw[first, a] * work.Jw[first, a]

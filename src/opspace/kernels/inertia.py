@@ -1,113 +1,133 @@
-"""The inertia as U Uᵀ, with zeros where a tree has them.
+"""The inertia as U Uᵀ, with zeros where a tree has them, and what that makes of motions and torques.
 
 Eliminated from the tips to the base, the inertia of a tree fills nothing in (Featherstone 2005): row a
-of U has entries only at the coordinates that a carries, which are neighbours. In whitened
-coordinates, û = U⁻¹ Γ and Ĵ = J U⁻ᵀ, rows of different branches have different columns.
+of Uᵀ has entries only at the coordinates that carry a. In whitened coordinates, û = U⁻¹ Γ and
+Ĵ = J U⁻ᵀ, rows of different branches have different columns.
 """
 
 from __future__ import annotations
 
 import math
 
+from opspace.kernels.whole_vectors import (
+    clear_after,
+    combine,
+    combine_by_column,
+    dots,
+    fill,
+    put,
+    put_first,
+    put_unit,
+    take_first,
+    whole,
+)
 from opspace.machine.jit import jit
 
 
 @jit
 def factor(M, inertia):
-    """Factor M = U Uᵀ, (n, n) kg·m², from the tips to the base.
+    """Factor M = U Uᵀ, (n, n) kg·m², from the tips to the base, and find U⁻ᵀ.
 
     Returns:
         Whether M is positive definite; otherwise U is not usable.
     """
-    U, inverse, before, end = inertia.U, inertia.inverse, inertia.before, inertia.end
-    for a in range(U.shape[0] - 1, -1, -1):
-        s = M[a, a]
-        for k in range(a + 1, end[a]):
-            s -= U[a, k] * U[a, k]
-        if not s > 0.0:
+    L, end = inertia.L, inertia.end
+    for a in range(L.shape[0] - 1, -1, -1):
+        row, size = L[a], whole(a + 1)
+        put_first(-1.0, M[a], row, a + 1)
+        combine_by_column(L, a, a + 1, end[a], row, 0, size)
+        square = -row[a]
+        if not square > 0.0:
             return False
-        U[a, a] = math.sqrt(s)
-        scale = 1.0 / U[a, a]
-        inverse[a] = scale
-        b = before[a]
-        while b >= 0:
-            s = M[b, a]
-            for k in range(a + 1, end[a]):
-                s -= U[a, k] * U[b, k]
-            U[b, a] = s * scale
-            b = before[b]
+        put(-1.0 / math.sqrt(square), row, row, 0, size)
+        clear_after(row, a + 1, size)
+    _invert(inertia)
     return True
 
 
 @jit
-def whiten_rows(inertia, last, first, end, X):
-    """Overwrite rows ``first`` to ``end`` − 1 of X (rows, n), of a frame behind ``last``, with X U⁻ᵀ."""
-    U, inverse, before = inertia.U, inertia.inverse, inertia.before
-    a = last
-    while a >= 0:
-        # Row by row inside, so that one need not wait for the other.
-        for i in range(first, end):
-            s = X[i, a]
-            for k in range(a + 1, last + 1):
-                s -= U[a, k] * X[i, k]
-            X[i, a] = s * inverse[a]
-        a = before[a]
+def _invert(inertia):
+    """Find U⁻ᵀ row by row from the base: what row a of Uᵀ makes of it is e_a."""
+    L, white = inertia.L, inertia.white
+    for a in range(L.shape[0]):
+        row = white[a]
+        put_unit(-1.0, a, row, whole(L.shape[0]))
+        _combine_chain(L[a], white, inertia, inertia.before[a], row)
+        put(-1.0 / L[a, a], row, row, 0, whole(a + 1))
+
+
+@jit
+def _combine_chain(factors, A, inertia, last, into):
+    """Into ← into + Σ factors[k] A[k] over all k from ``last`` to the base; A is lower triangular."""
+    start, before = inertia.start, inertia.before
+    while last >= 0:
+        first = start[last]
+        combine(factors, A, first, last + 1, into, 0, whole(last + 1))
+        last = before[first]
+
+
+@jit
+def whiten_rows(inertia, last, first, end, J, X):
+    """Fill rows ``first`` to ``end`` − 1 of X (rows, n) with J U⁻ᵀ, J of a frame behind ``last``."""
+    for i in range(first, end):
+        fill(0.0, X[i], 0, whole(inertia.white.shape[0]))
+        _combine_chain(J[i], inertia.white, inertia, last, X[i])
+
+
+@jit
+def whiten_row(inertia, x, out):
+    """Fill a padded row out (n,) with x U⁻ᵀ, for any row x (n,) of a Jacobian."""
+    n = inertia.white.shape[0]
+    fill(0.0, out, 0, whole(n))
+    combine(x, inertia.white, 0, n, out, 0, whole(n))
 
 
 @jit
 def whiten(inertia, x):
     """Overwrite any row x (n,) of a Jacobian with x U⁻ᵀ, and a torque [N·m] with U⁻¹ x [√J/s]."""
-    U, inverse, end = inertia.U, inertia.inverse, inertia.end
-    for a in range(U.shape[0] - 1, -1, -1):
-        s = x[a]
-        for k in range(a + 1, end[a]):
-            s -= U[a, k] * x[k]
-        x[a] = s * inverse[a]
+    whiten_row(inertia, x, inertia.spare)
+    take_first(inertia.spare, x, inertia.white.shape[0])
 
 
 @jit
 def unit_row(inertia, a, weight, x):
     """Fill x (n,) with the whitened row of a joint: weight · e_aᵀ U⁻ᵀ."""
-    U, inverse, before = inertia.U, inertia.inverse, inertia.before
-    for b in range(x.shape[0]):
-        x[b] = 0.0
-    x[a] = weight * inverse[a]
-    b = before[a]
-    while b >= 0:
-        s = 0.0
-        for k in range(b + 1, a + 1):
-            s -= U[b, k] * x[k]
-        x[b] = s * inverse[b]
-        b = before[b]
+    for b in range(inertia.white.shape[0]):
+        x[b] = weight * inertia.white[a, b]
 
 
 @jit
 def acceleration_of(inertia, x):
     """Overwrite a whitened torque (n,) [√J/s] with the acceleration U⁻ᵀ x [rad/s²] that it causes."""
-    U, inverse, end = inertia.U, inertia.inverse, inertia.end
-    for a in range(U.shape[0]):
-        x[a] *= inverse[a]
-        for k in range(a + 1, end[a]):
-            x[k] -= U[a, k] * x[a]
+    _times(inertia.white, x, x, inertia)
 
 
 @jit
 def whitened_of(inertia, x, out):
     """Fill out (n,) with the whitened torque Uᵀ x [√J/s] of an acceleration [rad/s²]."""
-    U, end = inertia.U, inertia.end
-    for a in range(U.shape[0]):
-        out[a] = 0.0
-    for a in range(U.shape[0]):
-        for k in range(a, end[a]):
-            out[k] += U[a, k] * x[a]
+    _times(inertia.L, x, out, inertia)
+
+
+@jit
+def _times(A, x, out, inertia):
+    """Fill out (n,) with A x."""
+    n = A.shape[0]
+    put_first(1.0, x, inertia.spare, n)
+    dots(inertia.spare, A, n, inertia.product, whole(n))
+    take_first(inertia.product, out, n)
 
 
 @jit
 def torque_of(inertia, x, out):
     """Fill out (n,) with the torque U x [N·m] of a whitened one [√J/s]."""
-    U, end = inertia.U, inertia.end
-    for a in range(U.shape[0]):
-        s = 0.0
-        for k in range(a, end[a]):
-            s += U[a, k] * x[k]
-        out[a] = s
+    n = inertia.L.shape[0]
+    fill(0.0, inertia.spare, 0, whole(n))
+    combine(x, inertia.L, 0, n, inertia.spare, 0, whole(n))
+    take_first(inertia.spare, out, n)
+
+
+@jit
+def joint_row(inertia, j, out):
+    """Fill out (n,) with row j of U: what a unit of each whitened torque gives joint j [N·m]."""
+    for a in range(inertia.L.shape[0]):
+        out[a] = inertia.L[a, j]

@@ -9,13 +9,24 @@ from opspace.kernels.algebra import (
     apply_reflectors_transposed,
     cholesky,
     householder,
+    invert_lower,
     singular_values,
     solve_lower,
     solve_lower_transposed,
-    solve_upper,
-    solve_upper_transposed,
 )
 from opspace.kernels.compiled_scalars import fade
+from opspace.kernels.whole_vectors import (
+    add,
+    add_sizes,
+    clear_after,
+    combine,
+    copy,
+    dot,
+    dots,
+    fill,
+    put_unit,
+    whole,
+)
 from opspace.law.scalars import RANK_TOLERANCE
 from opspace.machine.jit import jit
 
@@ -41,22 +52,14 @@ def project(d, count, n, J, f, space):
         space: `SPACE`; Z, u, free are read, B (count, free) and residual (count,) written.
     """
     Z, u, B, rows, residual = space.Z[d], space.u[d], space.B, space.rows, space.residual
-    r = space.free[d]
+    r, end = space.free[d], whole(n)
     for i in range(count):
         row, into = J[rows[i]], B[i]
-        done = 0.0
-        for a in range(n):
-            done += row[a] * u[a]
-        residual[i] = f[rows[i]] - done
+        residual[i] = f[rows[i]] - dot(row, u, 0, end)
         if r == n:  # nothing is used yet, and Z is the identity
-            for b in range(n):
-                into[b] = row[b]
+            copy(row, into, 0, end)
             continue
-        for b in range(r):
-            x = 0.0
-            for a in range(n):
-                x += row[a] * Z[b, a]
-            into[b] = x
+        dots(row, Z, r, into, end)
 
 
 @jit
@@ -111,11 +114,9 @@ def _use_columns(m, r, space):
         How many are left; ``space.column`` lists them, then the others.
     """
     B, column, size = space.B, space.column, space.x
-    for b in range(r):
-        size[b] = 0.0
+    fill(0.0, size, 0, whole(r))
     for i in range(m):
-        for b in range(r):
-            size[b] += abs(B[i, b])
+        add_sizes(B[i], size, 0, whole(r))
     used = 0
     for b in range(r):
         if size[b] != 0.0:
@@ -128,6 +129,7 @@ def _use_columns(m, r, space):
     for i in range(m):
         for c in range(used):
             B[i, c] = B[i, column[c]]
+        clear_after(B[i], used, whole(used))
     others = used
     for b in range(r):
         if size[b] == 0.0:
@@ -144,8 +146,7 @@ def _bound(count, n, J, buffer, rows):
     # Before projection: a level of which nothing is left is rounding noise, however regular.
     size = 0.0
     for i in range(count):
-        for a in range(n):
-            size += J[rows[i], a] * J[rows[i], a]
+        size += dot(J[rows[i]], J[rows[i]], 0, whole(n))
     return REGULAR * size
 
 
@@ -153,60 +154,52 @@ def _bound(count, n, J, buffer, rows):
 def _solve_row(d, n, used, last, bound, space):
     """One row: a step along it; the others are turned by the reflector that makes it the first."""
     row, column, Z, left, along = space.B[0], space.column, space.Z[d], space.Z[d + 1], space.y
-    size = 0.0
-    for c in range(used):
-        size += row[c] * row[c]
+    end = whole(n)
+    size = dot(row, row, 0, whole(used))
     if not size > bound:
         return False
-    for a in range(n):
-        along[a] = 0.0
+    fill(0.0, along, 0, end)
     for c in range(used):
-        factor, vector = row[c], Z[column[c]]
-        for a in range(n):
-            along[a] += factor * vector[a]
-    factor = space.residual[0] / size
-    for a in range(n):
-        space.u[d + 1, a] = space.u[d, a] + factor * along[a]
+        add(row[c], Z[column[c]], along, 0, end)
+    copy(space.u[d], space.u[d + 1], 0, end)
+    add(space.residual[0] / size, along, space.u[d + 1], 0, end)
     r = space.free[d]
     space.free[d + 1] = r - 1
     if last:
         return True
     norm = math.sqrt(size)
-    first, pivot = Z[column[0]], row[0]
+    pivot = row[0]
     alpha = -norm if pivot > 0.0 else norm
     scale = 1.0 / (norm * (norm + abs(pivot)))
-    for a in range(n):
-        along[a] = scale * (along[a] - alpha * first[a])
+    add(-alpha, Z[column[0]], along, 0, end)
     for c in range(1, used):
-        factor, vector, turned = row[c], Z[column[c]], left[c - 1]
-        for a in range(n):
-            turned[a] = vector[a] - factor * along[a]
+        copy(Z[column[c]], left[c - 1], 0, end)
+        add(-row[c] * scale, along, left[c - 1], 0, end)
     for c in range(used, r):
-        _copy(n, Z[column[c]], left[c - 1])
+        copy(Z[column[c]], left[c - 1], 0, end)
     return True
 
 
 @jit
 def _solve_wide(d, m, n, used, last, bound, space):
-    """Rows that are all active: x = Q R⁻ᵀ residual; what is left free is the rest of Q."""
-    B, R, x, scale, residual = space.B, space.R, space.x, space.scale, space.residual
-    householder(B, m, used, scale, R)
-    if not _regular(R, m, bound, space):
+    """Rows that are all active: x = Q L⁻¹ residual; what is left free is the rest of Q."""
+    B, x, scale = space.B, space.x, space.scale
+    householder(B, m, used, scale, space.L)
+    if not _regular(m, bound, space):
         return False
-    for i in range(m):
-        x[i] = residual[i]
-    solve_upper_transposed(R, m, x)
+    clear_after(space.residual, m, whole(m))
+    dots(space.residual, space.X, m, x, whole(m))
     r = space.free[d]
     space.free[d + 1] = r - m
     if used < r or (not last and r - m > m):
         _turn_basis(d, m, n, used, r, space)
         return True
-    for i in range(m, r):
-        x[i] = 0.0
+    end = whole(n)
+    clear_after(x, m, whole(r))
     apply_reflectors(B, m, r, scale, x)
     if r == n:  # the basis is the identity
-        for a in range(n):
-            space.u[d + 1, a] = space.u[d, a] + x[a]
+        copy(space.u[d], space.u[d + 1], 0, end)
+        add(1.0, x, space.u[d + 1], 0, end)
     else:
         _step(n, r, space.Z[d], x, space.u[d], space.u[d + 1])
     if not last:
@@ -216,17 +209,16 @@ def _solve_wide(d, m, n, used, last, bound, space):
 
 
 @jit
-def _regular(R, m, bound, space):
-    """Whether all eigenvalues of RᵀR are above a bound."""
-    G = space.G
+def _regular(m, bound, space):
+    """Whether all eigenvalues of L Lᵀ are above a bound; X is L⁻¹ then.
+
+    None is below 1/‖L⁻¹‖², by Frobenius, which is near the smallest: the others are rarely looked at.
+    """
+    L, X, G = space.L, space.X, space.G
+    if invert_lower(L, m, X) * bound < 1.0:
+        return True
     for i in range(m):
-        for j in range(i + 1):
-            G[i, j] = 0.0
-    for k in range(m):
-        for i in range(k, m):
-            factor = R[k, i]
-            for j in range(k, i + 1):
-                G[i, j] += factor * R[k, j]
+        dots(L[i], L, i + 1, G[i], whole(i + 1))
     return cholesky(G, m, bound, space.Y)
 
 
@@ -237,36 +229,27 @@ def _turn_basis(d, m, n, used, r, space):
     The same as column by column, and cheaper where many are left.
     """
     turned, column, Z, left = space.V[d], space.column, space.Z[d], space.Z[d + 1]
+    end = whole(n)
     for c in range(used):
-        _copy(n, Z[column[c]], turned[c])
+        copy(Z[column[c]], turned[c], 0, end)
     _turn(m, n, used, space.B, space.scale, turned, space.y)
     _step(n, m, turned, space.x, space.u[d], space.u[d + 1])
     for c in range(m, used):
-        _copy(n, turned[c], left[c - m])
+        copy(turned[c], left[c - m], 0, end)
     for c in range(used, r):
-        _copy(n, Z[column[c]], left[c - m])
-
-
-@jit
-def _copy(n, x, into):
-    for a in range(n):
-        into[a] = x[a]
+        copy(Z[column[c]], left[c - m], 0, end)
 
 
 @jit
 def _turn(m, n, r, B, scale, turned, w):
     """Turn a basis so that its first m vectors are those that the rows use."""
+    end = whole(n)
     for k in range(m):
-        for a in range(n):
-            w[a] = 0.0
+        fill(0.0, w, 0, end)
         for b in range(k, r):
-            factor = B[k, b]
-            for a in range(n):
-                w[a] += factor * turned[b, a]
+            add(B[k, b], turned[b], w, 0, end)
         for b in range(k, r):
-            factor = scale[k] * B[k, b]
-            for a in range(n):
-                turned[b, a] -= factor * w[a]
+            add(-scale[k] * B[k, b], w, turned[b], 0, end)
 
 
 @jit
@@ -277,18 +260,20 @@ def _solve_tall(d, m, n, r, bound, space):
     for b in range(r):
         for i in range(m):
             C[b, i] = B[i, b]
-            size += C[b, i] * C[b, i]
+        clear_after(C[b], m, whole(m))
+        size += dot(C[b], C[b], 0, whole(m))
     enough = NORMAL * size
     if not _solve_normal(m, r, max(bound, enough), space):
         if bound >= enough:
             return False
-        householder(C, r, m, space.scale, space.R)
-        if not _regular(space.R, r, bound, space):
+        householder(C, r, m, space.scale, space.L)
+        if not _regular(r, bound, space):
             return False
-        for i in range(m):
-            x[i] = residual[i]
-        apply_reflectors_transposed(C, r, m, space.scale, x)
-        solve_upper(space.R, r, x)
+        copy(residual, space.y, 0, whole(m))
+        clear_after(space.y, m, whole(m))
+        apply_reflectors_transposed(C, r, m, space.scale, space.y)
+        fill(0.0, x, 0, whole(r))
+        combine(space.y, space.X, 0, r, x, 0, whole(r))
     _step(n, r, space.Z[d], x, space.u[d], space.u[d + 1])
     space.free[d + 1] = 0
     return True
@@ -301,21 +286,15 @@ def _solve_normal(m, r, bound, space):
     Returns:
         Whether all eigenvalues of BᵀB are above the bound; otherwise there is no x.
     """
-    C, G, L, x, residual = space.C, space.G, space.R, space.x, space.residual
+    C, G, L, x, residual = space.C, space.G, space.L, space.x, space.residual
+    end = whole(m)
+    clear_after(residual, m, end)
     for a in range(r):
-        for b in range(a + 1):
-            total = 0.0
-            for i in range(m):
-                total += C[a, i] * C[b, i]
-            G[a, b] = total
+        dots(C[a], C, a + 1, G[a], end)
     if not cholesky(G, r, bound, L):
         return False
     cholesky(G, r, 0.0, L)
-    for a in range(r):
-        total = 0.0
-        for i in range(m):
-            total += C[a, i] * residual[i]
-        x[a] = total
+    dots(residual, C, r, x, end)
     solve_lower(L, r, x)
     solve_lower_transposed(L, r, x)
     return True
@@ -324,20 +303,15 @@ def _solve_normal(m, r, bound, space):
 @jit
 def _step(n, count, vectors, x, before, after):
     """û_l = û_{l−1} + Σ x_b vectors_b."""
-    for a in range(n):
-        after[a] = before[a]
-    for b in range(count):
-        factor = x[b]
-        for a in range(n):
-            after[a] += factor * vectors[b, a]
+    end = whole(n)
+    copy(before, after, 0, end)
+    combine(x, vectors, 0, count, after, 0, end)
 
 
 @jit
 def _complement(d, m, n, used, j, x, space, vector):
     """Column j of Q, in joint coordinates."""
-    for b in range(used):
-        x[b] = 0.0
-    x[j] = 1.0
+    put_unit(1.0, j, x, whole(used))
     apply_reflectors(space.B, m, used, space.scale, x)
     _combine(n, used, space.free[d], space.Z[d], space.column, x, vector)
 
@@ -345,25 +319,23 @@ def _complement(d, m, n, used, j, x, space, vector):
 @jit
 def _combine(n, used, r, Z, column, x, vector):
     """Σ x_c times the vectors of Z that are used, of r in all."""
-    for a in range(n):
-        vector[a] = 0.0
+    end = whole(n)
+    fill(0.0, vector, 0, end)
     if r == n:  # the basis is the identity
         for c in range(used):
             vector[column[c]] = x[c]
         return
     for c in range(used):
-        factor, basis = x[c], Z[column[c]]
-        for a in range(n):
-            vector[a] += factor * basis[a]
+        add(x[c], Z[column[c]], vector, 0, end)
 
 
 @jit
 def _singular_wide(m, space):
-    """Singular values of Rᵀ, hence of the level; C gets σ_i u_i as rows."""
-    C, R = space.C, space.R
+    """Singular values of L, hence of the level; C gets σ_i u_i as rows."""
+    C, L = space.C, space.L
     for i in range(m):
         for j in range(m):
-            C[i, j] = R[i, j] if j >= i else 0.0
+            C[i, j] = L[j, i] if j >= i else 0.0
     singular_values(C, m, m, space.Y, space.sigma)
 
 
@@ -463,7 +435,7 @@ def _directions(d, m, n, used, rank, space):
     )
     r = space.free[d]
     for i in range(rank):
-        for b in range(used):
+        for b in range(whole(used)):
             x[b] = Y[i, b] if b < rank else 0.0
         if m < r:
             apply_reflectors(B, m, used, scale, x)
@@ -471,7 +443,7 @@ def _directions(d, m, n, used, rank, space):
     for j in range(rank, used):
         _complement(d, m, n, used, j, x, space, V[j])
     for j in range(used, r):
-        _copy(n, Z[column[j]], V[j])
+        copy(Z[column[j]], V[j], 0, whole(n))
 
 
 @jit
@@ -488,10 +460,8 @@ def take_alternative(d, i, n, space):
     space.free[d + 1] = r - i
     if i == 0:
         V = space.Z[d]  # as it was, so that the identity stays one
-    for a in range(n):
-        total = before[a]
-        for k in range(i):
-            total += strength[k] * V[k, a]
-        after[a] = total
+    end = whole(n)
+    copy(before, after, 0, end)
+    combine(strength, V, 0, i, after, 0, end)
     for k in range(i, r):
-        _copy(n, V[k], left[k - i])
+        copy(V[k], left[k - i], 0, end)

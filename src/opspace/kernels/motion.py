@@ -17,6 +17,7 @@ from opspace.kernels.columns import (
     TOOL_AXES,
 )
 from opspace.kernels.stance_columns import BASE_SIZE
+from opspace.kernels.whole_vectors import add, fill, put_products, whole
 from opspace.machine.jit import jit
 
 # Columns of Tick.motion: rotation by rows, position, velocity, drift.
@@ -60,6 +61,8 @@ def move_joints(work):
                 a[i] += acceleration[p, i]
         if j == BASE_SIZE - 1 and work.option[BASE] != 0.0:
             _move_base(work)
+        for i in range(6):
+            work.across[i, j] = axes[j, i]
 
 
 @jit
@@ -119,21 +122,18 @@ def _rates(work, m, joint, x):
 
 @jit
 def _jacobian(work, m, joint, x):
-    J = work.motion_J[m]
+    """Jacobian of the point p of a body: ω × p + v of each axis that carries it."""
+    J, across, end = work.motion_J[m], work.across, whole(work.v.shape[0])
+    if joint < 0:
+        for i in range(6):
+            fill(0.0, J[i], 0, end)
+        return
     for i in range(6):
-        for a in range(work.v.shape[0]):
-            J[i, a] = 0.0
-    px, py, pz = x[P], x[P + 1], x[P + 2]
-    j = joint
-    while j >= 0:
-        wx, wy, wz = work.axes[j, 3], work.axes[j, 4], work.axes[j, 5]
-        J[0, j] = work.axes[j, 0] + wy * pz - wz * py
-        J[1, j] = work.axes[j, 1] + wz * px - wx * pz
-        J[2, j] = work.axes[j, 2] + wx * py - wy * px
-        J[3, j] = wx
-        J[4, j] = wy
-        J[5, j] = wz
-        j = work.parent[j]
+        put_products(work.carried_by[joint], across[i], J[i], 0, end)
+    for i in range(3):
+        j, k = (i + 1) % 3, (i + 2) % 3
+        add(x[P + k], J[3 + j], J[i], 0, end)
+        add(-x[P + j], J[3 + k], J[i], 0, end)
 
 
 @jit

@@ -7,7 +7,7 @@ import math
 from opspace.kernels.algebra import cholesky, cholesky_row, solve_lower, solve_lower_transposed
 from opspace.kernels.compiled_scalars import hardened, level_weight
 from opspace.kernels.distances import faster, row_softness
-from opspace.kernels.inertia import acceleration_of, unit_row, whiten, whitened_of
+from opspace.kernels.inertia import acceleration_of, joint_row, unit_row, whiten, whitened_of
 from opspace.kernels.walk import slot_bit
 from opspace.law.scalars import BROKEN, CLEANINGS, HANDOVERS, HARD, ROUNDING, SOFT, UNBOUNDED
 from opspace.machine.jit import jit
@@ -145,8 +145,7 @@ def _normals(inertia, n, bounds):
     for j in range(n):
         unit_row(inertia, j, 1.0, bounds.row)
         count = _two_sided(count, n, j, bounds.lower[j], bounds.upper[j], SOFT, bounds)
-        for a in range(n):
-            bounds.row[a] = inertia.U[j, a]
+        joint_row(inertia, j, bounds.row)
         count = _two_sided(count, n, 2 * n + j, bounds.least[j], bounds.most[j], HARD, bounds)
     return count
 

@@ -24,10 +24,7 @@ def add_spring(work, i, size):
     """
     first, rows, n = work.kind[i, FIRST_ROW], work.kind[i, ROWS], work.v.shape[0]
     X, pull, spring = work.Jw, work.fw, work.spring
-    for row in range(first, first + rows):
-        for a in range(n):
-            X[row, a] = work.J[row, a]
-    whiten_rows(work.inertia, work.kind[i, JOINT], first, first + rows, X)
+    whiten_rows(work.inertia, work.kind[i, JOINT], first, first + rows, work.J, X)
     for row in range(first, first + rows):
         light, rate = LIGHTEST, _wanted_rate(work, i, row, size)
         total = 0.0

@@ -34,6 +34,7 @@ from opspace.kernels.compiled_scalars import (
 from opspace.kernels.momentum_rows import momentum_task
 from opspace.kernels.motion import A, P, R, V, measure, move_joints, selected
 from opspace.kernels.spring_rows import add_spring
+from opspace.kernels.whole_vectors import add, fill, whole
 from opspace.law.scalars import SIGNS
 from opspace.machine.jit import jit
 
@@ -126,16 +127,15 @@ def _motion_task(work, i):
 def _project(work, i, row, block, size, x, e):
     """One task row: the selected combination of the motion's rows, in world or tool axes."""
     number = work.numbers[i]
-    for a in range(work.v.shape[0]):
-        work.J[row, a] = 0.0
+    J, end = work.J[row], whole(work.v.shape[0])
+    fill(0.0, J, 0, end)
     error, drift, rate, ahead = 0.0, 0.0, 0.0, 0.0
     for c in range(size):
         factor = selected(work, i, row, c)
         if factor == 0.0:
             continue
         source = block + c
-        for a in range(work.v.shape[0]):
-            work.J[row, a] += factor * work.motion_J[0, source, a]
+        add(factor, work.motion_J[0, source], J, 0, end)
         # Tool axes turn with the tool, which takes ω × ẋ from the drift and from the desired
         # acceleration alike: it cancels in f* − J̇ q̇ and is left out of both.
         drift += factor * x[A + source]

@@ -42,6 +42,7 @@ from opspace.kernels.inertia import (
     torque_of,
     unit_row,
     whiten,
+    whiten_row,
     whiten_rows,
     whitened_of,
 )
@@ -52,6 +53,7 @@ from opspace.kernels.limit_rows import begin_limits, insert_limits, keep_bounds
 from opspace.kernels.standing import stand
 from opspace.kernels.task_rows import evaluate_tasks
 from opspace.kernels.walk import begin, keep_inside, pass_on, slot_bit, walk
+from opspace.kernels.whole_vectors import put, whole
 from opspace.law.scalars import CHAINED, EXACT, MOST_UNREST, NO_GROUP
 from opspace.law.scalars import SCALED as GIVEN_WAY
 from opspace.machine.jit import jit
@@ -231,17 +233,15 @@ def whiten_task(work, i, n):
     end = first + work.kind[i, ROWS]
     of_frame = work.kind[i, KIND] == MOTION or work.kind[i, KIND] == FORCE
     of_frame = of_frame and work.kind[i, SOURCE] == WORLD
+    if of_frame:
+        whiten_rows(work.inertia, work.kind[i, JOINT], first, end, J, Jw)
     for row in range(first, end):
         if work.kind[i, KIND] == JOINTS:
-            unit_row(work.inertia, work.coordinate[row], weight[row], Jw[row])
-            continue
-        for a in range(n):
-            Jw[row, a] = weight[row] * J[row, a]
-        if not of_frame:
-            whiten(work.inertia, Jw[row])
-    if of_frame:
-        whiten_rows(work.inertia, work.kind[i, JOINT], first, end, Jw)
-    for row in range(first, end):
+            put(weight[row], work.inertia.white[work.coordinate[row]], Jw[row], 0, whole(n))
+        else:
+            if not of_frame:
+                whiten_row(work.inertia, J[row], Jw[row])
+            put(weight[row], Jw[row], Jw[row], 0, whole(n))
         fw[row] = weight[row] * (work.wanted[row] - work.drift[row])
         if work.option[TASK_BIAS] != 0.0:
             for a in range(n):

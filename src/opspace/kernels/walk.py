@@ -8,6 +8,7 @@ from opspace.kernels import columns
 from opspace.kernels.compiled_scalars import room_for
 from opspace.kernels.inertia import torque_of
 from opspace.kernels.level import project, solve_level, take_alternative
+from opspace.kernels.whole_vectors import copy, fill, put_unit, whole
 from opspace.machine.jit import jit
 
 # Columns of ``Space.cursor``: corners of a node, the next one, corners of its group, next alternative.
@@ -18,11 +19,9 @@ FIRST, END, NEXT, GROUP, GROUP_END, ALTERNATIVE = range(6)
 def begin(n, levels, space):
     """Nothing decided, everything free: u [√J/s], Z, free at depth 0; nothing known about any level."""
     u, Z, top, got = space.u, space.Z, space.top, space.got
+    fill(0.0, u[0], 0, whole(n))
     for a in range(n):
-        u[0, a] = 0.0
-        for b in range(n):
-            Z[0, a, b] = 0.0
-        Z[0, a, a] = 1.0
+        put_unit(1.0, a, Z[0, a], whole(n))
     space.free[0] = n
     space.path[0] = 1.0
     for d in range(levels + 1):
@@ -172,11 +171,9 @@ def pass_on(d, n, space):
     u, Z = space.u, space.Z
     r = space.free[d]
     space.free[d + 1] = r
-    for a in range(n):
-        u[d + 1, a] = u[d, a]
+    copy(u[d], u[d + 1], 0, whole(n))
     for k in range(r):
-        for a in range(n):
-            Z[d + 1, k, a] = Z[d, k, a]
+        copy(Z[d, k], Z[d + 1, k], 0, whole(n))
     if space.motors[0] != 0:
         for a in range(n):
             space.torque[d + 1, a] = space.torque[d, a]
@@ -219,6 +216,5 @@ def _remember(d, count, share, present, space):
     unrest = 0.0
     for i in range(count):
         unrest += space.unrest[space.rows[i]]
-        for b in range(r):
-            kept[first + i, b] = B[i, b]
+        copy(B[i], kept[first + i], 0, whole(r))
     space.unrest_there[d] = math.sqrt(unrest)

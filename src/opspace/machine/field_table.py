@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from opspace.machine.lanes import whole
 from opspace.machine.record import Handle
 
 WRITERS = {
@@ -33,7 +34,8 @@ class Field(NamedTuple):
 
     Attributes:
         name: Its name in Python and in compiled code.
-        shape: Sizes by name; each is a number, a size, or a sum of products, as in ``"2 rows + 1"``.
+        shape: Sizes by name; each is a number, a size, or a sum of products, as in ``"2 rows + 1"``,
+            which ``"whole 2 rows + 1"`` rounds up.
         meaning: What it holds.
         unit: Of its numbers; empty for whole and pure numbers, and where the meaning says more.
         writer: Who writes it, one of `WRITERS`.
@@ -102,12 +104,18 @@ class Block:
         return part
 
 
+WHOLE = "whole "
+"""Begins sizes that are rounded up to whole vectors, see `opspace.machine.lanes`."""
+
+
 class _Extents(dict[Any, Any]):
     """Sizes by name, and what has been worked out from them: sums of products, and shapes."""
 
     def __missing__(self, size: str | tuple[int | str, ...]) -> int | tuple[int, ...]:
         if isinstance(size, tuple):
             found = tuple([one if type(one) is int else self[one] for one in size])
+        elif size.startswith(WHOLE):
+            found = whole(self[size.removeprefix(WHOLE)])
         elif size.isidentifier():
             raise ValueError(f"size {size!r} is not known, only {', '.join(map(str, self))}")
         else:

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import gc
+import re
 from typing import Any
 
 from numba.core import cgutils, fastmathpass, types
@@ -45,7 +46,7 @@ class Translation(CodeLibrary):
         """Return all that was translated, each function once."""
         whole = self.create_ir_module("")
         fastmathpass.rewrite_module(whole, FastMathOptions(FAST))
-        return cgutils.normalize_ir_text(str(whole))
+        return _without_unrolling(cgutils.normalize_ir_text(str(whole)))
 
     def get_function(self, name: str) -> Any:
         """Refuse: there is no code."""
@@ -66,6 +67,20 @@ def translate_only() -> None:
     context.get_executable = lambda *args: [].append  # a key of its own for each function
     slicing.fix_index = _as_it_is
     types.functions.BaseFunction.get_call_type = _resolved_once
+
+
+def _without_unrolling(text: str) -> str:
+    """Keep loops over whole vectors as they are: most end after one or two turns."""
+    end = re.compile(r'(br i1 [^\n]*label %"after[^\n,]*, label %"vectors[^\n,]*)')
+    text = end.sub(rf"\1, !llvm.loop !{LOOP}", text)
+    return f"""{text}
+!{LOOP} = distinct !{{!{LOOP}, !{LOOP + 1}}}
+!{LOOP + 1} = !{{!"llvm.loop.unroll.disable"}}
+"""
+
+
+LOOP = 1_000_000
+"""Number of a piece of metadata that numba has none of."""
 
 
 def _nothing(*args: Any, **options: Any) -> None:

@@ -15,6 +15,7 @@ from opspace.kernels.stance_columns import (
     SOLE_ROWS,
 )
 from opspace.machine.field_table import Field, Record, RecordTable
+from opspace.machine.lanes import whole
 from opspace.plan.bound_records import BOUNDS
 
 _INT = np.int64
@@ -24,7 +25,7 @@ _after = partial(Field, lives="tick")
 _kept = partial(Field, lives="kept")
 _EACH = f"{SOLE_ROWS} contacts"
 _BOUNDS = f"4 n + {4 * SOLE_ROWS + EACH} contacts + distances"
-_ALL = f"n + {SOLE_ROWS} contacts"
+_WHOLE = f"whole n + {SOLE_ROWS} contacts"
 
 STANCE = RecordTable(
     "Stance",
@@ -44,8 +45,8 @@ STANCE = RecordTable(
     _refresh("reference", (_EACH,), "force that is wanted of it", "N, N·m"),
     _plan("room", ("n",), "what the motors give where they are asked", "N·m", start=np.inf),
     _plan("exact", (BASE_SIZE,), "options of a level without a buffer"),
-    Field("J", (_EACH, "n"), "Jacobians", "m, 1"),
-    Field("Jw", (_EACH, "n"), "whitened rows J U⁻ᵀ"),
+    Field("J", (_EACH, "whole n"), "Jacobians", "m, 1"),
+    Field("Jw", (_EACH, "whole n"), "whitened rows J U⁻ᵀ"),
     Field("wanted", (_EACH,), "J q̈ that keeps each where it is", "m/s², rad/s²"),
     Field("order", ("contacts + 1",), "those on their way, the most active first", dtype=_INT),
     Field("corner_links", ("contacts + 1",), "how many of them each corner has", dtype=_INT),
@@ -68,14 +69,14 @@ STANCE = RecordTable(
     Field("accelerations", ("n", "n"), "q̈ of each", "rad/s²"),
     Field("torques", ("n", "n"), "torque of each", "N·m"),
     Field("loose", (_EACH,), "how far each force moves with its coordinate", "N, N·m"),
-    Field("E", (BASE_SIZE, _ALL), "rows of the base, then reflectors"),
+    Field("E", (BASE_SIZE, _WHOLE), "rows of the base, then reflectors"),
     Field("scale", (BASE_SIZE,), "their scales"),
-    Field("R", (BASE_SIZE, BASE_SIZE), "triangular factor"),
+    Field("lower", (BASE_SIZE, whole(BASE_SIZE)), "lower triangular factor"),
     Field("X", (BASE_SIZE, BASE_SIZE), "its columns, then σ times left singular vectors"),
     Field("turned", (BASE_SIZE, BASE_SIZE), "right singular vectors, as rows"),
     Field("sigma", (BASE_SIZE,), "singular values"),
     Field("start", (BASE_SIZE,), "shortest change that gives the base what it lacks"),
-    Field("row", (_ALL,), "any row of coordinates"),
+    Field("row", (_WHOLE,), "any row of coordinates"),
     Field("trial", ("n",), "q̈ at a point that may not be the last", "rad/s²"),
     _kept("remembered", (1,), "bounds that held at the tick before", dtype=_INT),
     _kept("held", (_BOUNDS,), "which they were", dtype=_INT),

@@ -10,6 +10,7 @@ import numpy as np
 
 from opspace.kernels.stance_columns import SOLE_ROWS
 from opspace.machine.field_table import Block, Record
+from opspace.machine.lanes import whole
 from opspace.plan.bound_records import BOUNDS
 from opspace.plan.contact_records import no_stance
 from opspace.plan.distance_records import DISTANCES
@@ -113,6 +114,7 @@ def make_tick(
         **{name: getattr(axes, name) for name in ("q", "v", "M", "bias", "axes", "placement")},
         "later_q": np.zeros(axes.q.size),
         "parent": np.array(axes.parent, np.int64),
+        "carried_by": _carried_by(axes.parent),
         "mass_place": axes.masses.place,
         "mass": axes.masses.points,
         "torque_limit": limit,
@@ -132,6 +134,17 @@ def make_tick(
     return TICK.make(sizes, {**kept, **given}), block.memory
 
 
+def _carried_by(parent: np.ndarray) -> np.ndarray:
+    """Return for every joint, by rows, which joints carry it, itself included."""
+    n = parent.size
+    found = np.zeros((n, whole(n)))
+    for a in range(n):
+        if parent[a] >= 0:
+            found[a] = found[parent[a]]
+        found[a, a] = 1.0
+    return found
+
+
 def _before(axes: MotionAxes) -> np.ndarray:
     """Return the coordinate before each one; an inertia that is not ours may couple any two."""
     n = axes.v.size
@@ -148,4 +161,9 @@ def make_inertia(before: np.ndarray) -> Record:
             carried[before[a]] += carried[a]
     if not np.array_equal(end - np.arange(n), carried):
         return make_inertia(np.arange(n) - 1)
-    return INERTIA.make({"n": n}, {"before": np.array(before, np.int64), "end": end})
+    start = np.arange(n)
+    for a in range(1, n):
+        if before[a] == a - 1:
+            start[a] = start[a - 1]
+    given = {"before": np.array(before, np.int64), "start": start, "end": end}
+    return INERTIA.make({"n": n}, given)

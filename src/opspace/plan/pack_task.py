@@ -354,7 +354,7 @@ class Packed:
         robot.check_state(robot.q, robot.v)
         terms = self.task.evaluate(robot, t)
         for given, kept in (
-            (terms.J, tick.J),
+            (terms.J, tick.J[:, : robot.v.size]),
             (terms.drift, tick.drift),
             (terms.acceleration, tick.wanted),
             (terms.error, tick.error),

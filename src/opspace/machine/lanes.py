@@ -1,0 +1,16 @@
+"""How long vectors are: rows that are worked on by vectors are padded with zeros to whole ones."""
+
+from __future__ import annotations
+
+LANES = 8
+"""Numbers in a vector. An arm has no more joints, so that of loops over them nothing is left."""
+
+
+def whole(count: int) -> int:
+    """Numbers in the whole vectors that hold so many."""
+    return (count + LANES - 1) & -LANES
+
+
+def whole_before(count: int) -> int:
+    """Numbers in the whole vectors that so many fill."""
+    return count & -LANES
