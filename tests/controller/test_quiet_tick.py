@@ -81,6 +81,54 @@ def test_no_tick_is_quiet_where_arrays_lie_otherwise(monkeypatch):
     assert other.looks == 5
 
 
+@pytest.mark.parametrize("kept", range(7))
+@pytest.mark.parametrize("view", [False, True])
+def test_torques_that_somebody_has_stay_as_they_were(kept, view):
+    quiet, looking = controller_of(Counting), controller_of(Looking)
+    held = []
+    for k in range(100):
+        one, other = (c.step(k * DT, *state(k)).tau for c in (quiet, looking))
+        held.append((one[:] if view else one, other))
+        held = held[-kept:] if kept else []
+        for ours, expected in held:
+            assert ours.tobytes() == expected.tobytes()
+        assert len({ours.ctypes.data for ours, _ in held}) == len(held)
+    assert quiet.looks <= 2
+
+
+def reshape(tau):
+    tau.shape = (2, 3)
+
+
+def shrink(tau):
+    tau.resize(3, refcheck=False)
+
+
+def lock(tau):
+    tau.flags.writeable = False
+
+
+def reinterpret(tau):
+    tau.dtype = np.int64
+
+
+def swap(tau):
+    tau.dtype = np.dtype(">f8")
+
+
+@pytest.mark.parametrize("change", [reshape, shrink, lock, reinterpret, swap])
+def test_arrays_that_were_changed_are_not_used_again(change):
+    quiet, looking = controller_of(Counting), controller_of(Looking)
+    for k in range(30):
+        one, other = (c.step(k * DT, *state(k)) for c in (quiet, looking))
+        assert one.tau.flags.writeable
+        assert one.tau.flags.owndata
+        assert (one.tau.shape, one.tau.dtype) == (other.tau.shape, other.tau.dtype)
+        assert one.tau.tobytes() == other.tau.tobytes()
+        change(one.tau)
+    assert quiet.looks <= 2
+
+
 @given(
     st.lists(
         st.tuples(

@@ -119,7 +119,9 @@ def test_compiled_is_readable(seed, contradictory):
         array[:] = values
     inertia = make_inertia(np.arange(x.size) - 1)
     assert factor(L @ L.T, inertia.handle())
-    change = np.linalg.solve(inertia.L[:, : len(L)].T, L)  # it factors the inertia from the other end
+    change = np.linalg.solve(
+        inertia.L[:, : len(L)].T, L
+    )  # it factors the inertia from the other end
     given_.W[:] = change @ W @ change.T
     compiled(inertia.handle(), x, given_.handle(), none.handle())
     readable = nearest_acceleration(L, W, start, *bounds)

@@ -147,7 +147,9 @@ def test_compiled_gives_way_as_the_readable_form_does(seed):
     distances.asked[:] = LEAST
     inertia = make_inertia(np.arange(x.size) - 1)
     assert factor(A, inertia.handle())
-    change = np.linalg.solve(inertia.L[:, : len(L)].T, L)  # it factors the inertia from the other end
+    change = np.linalg.solve(
+        inertia.L[:, : len(L)].T, L
+    )  # it factors the inertia from the other end
     bounds.W[:] = change @ W @ change.T
     ours = x.copy()
     compiled(inertia.handle(), ours, bounds.handle(), distances.handle())

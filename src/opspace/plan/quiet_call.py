@@ -10,7 +10,7 @@ import numpy as np
 
 from opspace.command import Command, Status
 from opspace.kernels.columns import SOLVE
-from opspace.machine.answer_call import AnswerParts
+from opspace.machine.answer_call import SPARE, AnswerParts, flags_of
 from opspace.machine.record import Handle, address_of
 from opspace.plan.entries import KERNELS
 from opspace.plan.plan import Plan
@@ -31,16 +31,23 @@ class QuietCall:
         statuses: What happened, by its number.
     """
 
-    __slots__ = ("_answer", "_handles", "address", "tick")
+    __slots__ = ("_addresses", "_answer", "_handles", "_spare", "address", "tick")
 
     def __init__(self, plan: Plan, quiet: Handle, statuses: Mapping[int, Status]) -> None:
         self._handles = quiet, plan.handle
+        self._spare = [plan.tick.tau.copy() for _ in range(SPARE)]
+        self._addresses = (ctypes.c_void_p * SPARE)(*map(id, self._spare))
         self._answer = AnswerParts(
             base=SOLVE,
             block=address_of(plan.memory),
             size=plan.memory.nbytes,
             copy=plan.tick.tau.copy,
+            spare=ctypes.addressof(self._addresses),
+            source=address_of(plan.tick.tau),
+            length=plan.tick.tau.size,
+            flags=flags_of(self._spare[0]),
             names=statuses,
+            usual=statuses[0],
             kind=Command,
             report=CompiledReport,
             made_with=plan,
