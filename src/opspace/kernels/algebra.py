@@ -11,6 +11,7 @@ from opspace.kernels.whole_vectors import (
     combine,
     copy,
     dot,
+    dots,
     put,
     put_at,
     put_unit,
@@ -144,6 +145,31 @@ def invert_lower(L, m, X):
         row, inverse, end = X[i], 1.0 / L[i, i], whole(i + 1)
         put_unit(-1.0, i, row, whole(m))
         combine(L[i], X, 0, i, row, 0, end)
+        put(-inverse, row, row, 0, end)
+        size += dot(row, row, 0, end)
+    return size
+
+
+@jit
+def invert_root(G, m, root, X):
+    """Fill X (m, m), its rows padded with zeros, with the inverse of the Cholesky factor of G.
+
+    Args:
+        G: (m, m), of which the lower half is read, its rows padded.
+        m: Number of rows.
+        root: (m,) padded, to work in: row after row of the factor.
+        X: Filled.
+
+    Returns:
+        ‖X‖², by Frobenius, the sum of 1/λ of all eigenvalues; no number where G is not positive definite.
+    """
+    size = 0.0
+    for i in range(m):
+        row, end = X[i], whole(i + 1)
+        dots(G[i], X, i, root, whole(i))
+        inverse = 1.0 / math.sqrt(G[i, i] - dot(root, root, 0, whole(i)))
+        put_unit(-1.0, i, row, whole(m))
+        combine(root, X, 0, i, row, 0, end)
         put(-inverse, row, row, 0, end)
         size += dot(row, row, 0, end)
     return size

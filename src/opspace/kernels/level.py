@@ -10,9 +10,8 @@ from opspace.kernels.algebra import (
     cholesky,
     householder,
     invert_lower,
+    invert_root,
     singular_values,
-    solve_lower,
-    solve_lower_transposed,
 )
 from opspace.kernels.compiled_scalars import fade
 from opspace.kernels.whole_vectors import (
@@ -114,6 +113,10 @@ def _use_columns(m, r, space):
         How many are left; ``space.column`` lists them, then the others.
     """
     B, column, size = space.B, space.column, space.x
+    if r <= m:
+        for b in range(r):
+            column[b] = b
+        return r
     fill(0.0, size, 0, whole(r))
     for i in range(m):
         add_sizes(B[i], size, 0, whole(r))
@@ -246,8 +249,7 @@ def _turn(m, n, r, B, scale, turned, w):
     end = whole(n)
     for k in range(m):
         fill(0.0, w, 0, end)
-        for b in range(k, r):
-            add(B[k, b], turned[b], w, 0, end)
+        combine(B[k], turned, k, r, w, 0, end)
         for b in range(k, r):
             add(-scale[k] * B[k, b], w, turned[b], 0, end)
 
@@ -286,17 +288,16 @@ def _solve_normal(m, r, bound, space):
     Returns:
         Whether all eigenvalues of BᵀB are above the bound; otherwise there is no x.
     """
-    C, G, L, x, residual = space.C, space.G, space.L, space.x, space.residual
-    end = whole(m)
-    clear_after(residual, m, end)
+    C, G, X, y, x, end = space.C, space.G, space.X, space.y, space.x, whole(m)
+    clear_after(space.residual, m, end)
     for a in range(r):
         dots(C[a], C, a + 1, G[a], end)
-    if not cholesky(G, r, bound, L):
+    if not invert_root(G, r, y, X) * bound < 1.0 and not cholesky(G, r, bound, space.Y):
         return False
-    cholesky(G, r, 0.0, L)
-    dots(residual, C, r, x, end)
-    solve_lower(L, r, x)
-    solve_lower_transposed(L, r, x)
+    dots(space.residual, C, r, x, end)
+    dots(x, X, r, y, whole(r))
+    fill(0.0, x, 0, whole(r))
+    combine(y, X, 0, r, x, 0, whole(r))
     return True
 
 

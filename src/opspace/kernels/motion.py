@@ -34,10 +34,37 @@ def cross_add(out, i, ax, ay, az, bx, by, bz):
 
 @jit
 def move_joints(work):
-    """Velocity and drift (n, 6) of the body behind every joint, seen at the origin of the world.
+    """Velocity and drift (n, 6) of every body, seen at the origin of the world, where its last joint is.
 
-    V_j = V_parent + s_j v_j,  A_j = A_parent + (V_j × s_j) v_j: an axis s_j moves with its body. The
-    three axes about which a floating base turns all move with the base.
+    The axes of the joints go by components into across (6, n).
+    """
+    if work.bodies.kind.shape[0] > 0:
+        _take_motion(work)
+    else:
+        _compute_motion(work)
+    for j in range(work.v.shape[0]):
+        for i in range(6):
+            work.across[i, j] = work.axes[j, i]
+
+
+@jit
+def _take_motion(work):
+    """The dynamics know both: gravity, which they count as an acceleration, is taken off again."""
+    bodies, velocity, acceleration = work.bodies, work.velocity, work.acceleration
+    for i in range(1, bodies.kind.shape[0]):
+        j = bodies.first_v[i] + bodies.width[i] - 1
+        for c in range(6):
+            velocity[j, c] = work.dynamics.velocity[i, c]
+            acceleration[j, c] = work.dynamics.acceleration[i, c]
+        for c in range(3):
+            acceleration[j, c] += bodies.gravity[c]
+
+
+@jit
+def _compute_motion(work):
+    """V_j = V_parent + s_j v_j,  A_j = A_parent + (V_j × s_j) v_j: an axis s_j moves with its body.
+
+    The three axes about which a floating base turns all move with the base.
     """
     axes, velocity, acceleration = work.axes, work.velocity, work.acceleration
     for j in range(work.v.shape[0]):
@@ -61,8 +88,6 @@ def move_joints(work):
                 a[i] += acceleration[p, i]
         if j == BASE_SIZE - 1 and work.option[BASE] != 0.0:
             _move_base(work)
-        for i in range(6):
-            work.across[i, j] = axes[j, i]
 
 
 @jit

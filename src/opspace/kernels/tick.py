@@ -53,7 +53,7 @@ from opspace.kernels.limit_rows import begin_limits, insert_limits, keep_bounds
 from opspace.kernels.standing import stand
 from opspace.kernels.task_rows import evaluate_tasks
 from opspace.kernels.walk import begin, keep_inside, pass_on, slot_bit, walk
-from opspace.kernels.whole_vectors import put, whole
+from opspace.kernels.whole_vectors import dot, put, whole
 from opspace.law.scalars import CHAINED, EXACT, MOST_UNREST, NO_GROUP
 from opspace.law.scalars import SCALED as GIVEN_WAY
 from opspace.machine.jit import jit
@@ -231,21 +231,23 @@ def whiten_task(work, i, n):
     J, Jw, fw, weight = work.J, work.Jw, work.fw, work.row_weight
     first = work.kind[i, FIRST_ROW]
     end = first + work.kind[i, ROWS]
-    of_frame = work.kind[i, KIND] == MOTION or work.kind[i, KIND] == FORCE
-    of_frame = of_frame and work.kind[i, SOURCE] == WORLD
-    if of_frame:
-        whiten_rows(work.inertia, work.kind[i, JOINT], first, end, J, Jw)
-    for row in range(first, end):
-        if work.kind[i, KIND] == JOINTS:
+    if work.kind[i, KIND] == JOINTS:
+        for row in range(first, end):
             put(weight[row], work.inertia.white[work.coordinate[row]], Jw[row], 0, whole(n))
+    else:
+        of_frame = work.kind[i, KIND] == MOTION or work.kind[i, KIND] == FORCE
+        if of_frame and work.kind[i, SOURCE] == WORLD:
+            whiten_rows(work.inertia, work.kind[i, JOINT], first, end, J, Jw)
         else:
-            if not of_frame:
+            for row in range(first, end):
                 whiten_row(work.inertia, J[row], Jw[row])
+        for row in range(first, end):
             put(weight[row], Jw[row], Jw[row], 0, whole(n))
+    for row in range(first, end):
         fw[row] = weight[row] * (work.wanted[row] - work.drift[row])
-        if work.option[TASK_BIAS] != 0.0:
-            for a in range(n):
-                fw[row] += Jw[row, a] * work.drop[a]
+    if work.option[TASK_BIAS] != 0.0:
+        for row in range(first, end):
+            fw[row] += dot(Jw[row], work.drop, 0, whole(n))
 
 
 @jit

@@ -78,11 +78,10 @@ def sums_of_products(
     builder: Any, x: Any, A: Any, columns: Any, count: Any, into: Any, width: Any
 ) -> None:
     """Emit into[b] ← Σ x A[b] for so many rows of A, of which ``width`` numbers count; zeros behind."""
-    zero, last = INDEX(0), builder.sub(count, INDEX(1))
+    zero = INDEX(0)
 
     def four(b: Any) -> list[Any]:
-        rows = [builder.add(b, INDEX(i)) for i in range(FOUR)]
-        starts = [builder.mul(_smaller(builder, row, last), columns) for row in rows]
+        starts = [builder.mul(builder.add(b, INDEX(i)), columns) for i in range(FOUR)]
 
         def body(c: Any, *totals: Any) -> list[Any]:
             factor = _load(builder, x, c)
@@ -93,11 +92,20 @@ def sums_of_products(
             ]
 
         totals = _loop(builder, zero, width, LANES, body, [_zeros(VECTOR)] * FOUR)
-        sums = _four_sums(builder, totals)
-        _store(builder, _kept(builder, sums, "<", builder.sub(count, b)), into, b)
+        _store(builder, _four_sums(builder, totals), into, b)
         return []
 
-    _loop(builder, zero, count, FOUR, four)
+    def rest(b: Any, sums: Any) -> list[Any]:
+        row = builder.gep(A, [builder.mul(b, columns)])
+        one = sum_of_products(builder, x, row, zero, width)
+        here = _compared(builder, FOUR, "==", builder.sub(b, by_four))
+        return [builder.select(here, _all(builder, one, FOUR), sums)]
+
+    by_four = builder.and_(count, INDEX(-FOUR))
+    _loop(builder, zero, by_four, FOUR, four)
+    with builder.if_then(builder.icmp_signed("<", by_four, count)):
+        (sums,) = _loop(builder, by_four, count, 1, rest, [_zeros(ir.VectorType(DOUBLE, FOUR))])
+        _store(builder, sums, into, by_four)
     end = builder.and_(builder.add(count, INDEX(FOUR - 1)), INDEX(-FOUR))
     with builder.if_then(builder.icmp_signed("!=", builder.and_(end, INDEX(FOUR)), zero)):
         _store(builder, _zeros(ir.VectorType(DOUBLE, FOUR)), into, end)
@@ -257,10 +265,6 @@ def _kept(builder: Any, x: Any, which: str, count: Any) -> Any:
 def _compared(builder: Any, lanes: int, which: str, count: Any) -> Any:
     places = ir.Constant(ir.VectorType(INDEX, lanes), [INDEX(i) for i in range(lanes)])
     return builder.icmp_signed(which, places, _all(builder, count, lanes))
-
-
-def _smaller(builder: Any, x: Any, y: Any) -> Any:
-    return builder.select(builder.icmp_signed("<", x, y), x, y)
 
 
 def _change(builder: Any, into: Any, first: Any, end: Any, value: Callable[..., Any]) -> None:

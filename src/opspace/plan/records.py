@@ -227,7 +227,7 @@ TICK = RecordTable(
     _work("limit_order", ("limits + 1",), "the chain of the limits", dtype=_INT),
     _work("rest", ("n + 1",), "f̂ of what no task uses, and whether there is one", "√J/s"),
     _work("u", ("n",), "whitened torque", "√J/s"),
-    _work("drop", ("n",), "whitened bias", "√J/s"),
+    _work("drop", ("whole n",), "whitened bias", "√J/s"),
     _after("joint_acceleration", ("n",), "q̈ of the torque", "rad/s²"),
     _work("wanted_acceleration", ("n",), "q̈ of the law's torque", "rad/s²"),
     _work("wanted_tau", ("n",), "the law's torque", "N·m"),
