@@ -161,7 +161,7 @@ def invert_root(G, m, root, X):
         X: Filled.
 
     Returns:
-        ‖X‖², by Frobenius, the sum of 1/λ of all eigenvalues; no number where G is not positive definite.
+        ‖X‖², by Frobenius, the sum of all 1/λ; no number where G is not positive definite.
     """
     size = 0.0
     for i in range(m):

@@ -13,6 +13,7 @@ from opspace.kernels.whole_vectors import (
     clear_after,
     combine,
     combine_by_column,
+    combined,
     dots,
     fill,
     put,
@@ -69,17 +70,22 @@ def _combine_chain(factors, A, inertia, last, into):
 @jit
 def whiten_rows(inertia, last, first, end, J, X):
     """Fill rows ``first`` to ``end`` − 1 of X (rows, n) with J U⁻ᵀ, J of a frame behind ``last``."""
+    white = inertia.white
+    width = whole(white.shape[0])
     for i in range(first, end):
-        fill(0.0, X[i], 0, whole(inertia.white.shape[0]))
-        _combine_chain(J[i], inertia.white, inertia, last, X[i])
+        if last < 0:
+            fill(0.0, X[i], 0, width)
+        else:
+            start = inertia.start[last]
+            combined(J[i], white, start, last + 1, X[i], width)
+            _combine_chain(J[i], white, inertia, inertia.before[start], X[i])
 
 
 @jit
 def whiten_row(inertia, x, out):
     """Fill a padded row out (n,) with x U⁻ᵀ, for any row x (n,) of a Jacobian."""
     n = inertia.white.shape[0]
-    fill(0.0, out, 0, whole(n))
-    combine(x, inertia.white, 0, n, out, 0, whole(n))
+    combined(x, inertia.white, 0, n, out, whole(n))
 
 
 @jit
@@ -121,8 +127,7 @@ def _times(A, x, out, inertia):
 def torque_of(inertia, x, out):
     """Fill out (n,) with the torque U x [N·m] of a whitened one [√J/s]."""
     n = inertia.L.shape[0]
-    fill(0.0, inertia.spare, 0, whole(n))
-    combine(x, inertia.L, 0, n, inertia.spare, 0, whole(n))
+    combined(x, inertia.L, 0, n, inertia.spare, whole(n))
     take_first(inertia.spare, out, n)
 
 

@@ -19,6 +19,7 @@ from opspace.kernels.whole_vectors import (
     add_sizes,
     clear_after,
     combine,
+    combined,
     copy,
     dot,
     dots,
@@ -248,8 +249,7 @@ def _turn(m, n, r, B, scale, turned, w):
     """Turn a basis so that its first m vectors are those that the rows use."""
     end = whole(n)
     for k in range(m):
-        fill(0.0, w, 0, end)
-        combine(B[k], turned, k, r, w, 0, end)
+        combined(B[k], turned, k, r, w, end)
         for b in range(k, r):
             add(-scale[k] * B[k, b], w, turned[b], 0, end)
 
@@ -274,8 +274,7 @@ def _solve_tall(d, m, n, r, bound, space):
         copy(residual, space.y, 0, whole(m))
         clear_after(space.y, m, whole(m))
         apply_reflectors_transposed(C, r, m, space.scale, space.y)
-        fill(0.0, x, 0, whole(r))
-        combine(space.y, space.X, 0, r, x, 0, whole(r))
+        combined(space.y, space.X, 0, r, x, whole(r))
     _step(n, r, space.Z[d], x, space.u[d], space.u[d + 1])
     space.free[d + 1] = 0
     return True
@@ -296,8 +295,7 @@ def _solve_normal(m, r, bound, space):
         return False
     dots(space.residual, C, r, x, end)
     dots(x, X, r, y, whole(r))
-    fill(0.0, x, 0, whole(r))
-    combine(y, X, 0, r, x, 0, whole(r))
+    combined(y, X, 0, r, x, whole(r))
     return True
 
 
@@ -321,6 +319,9 @@ def _complement(d, m, n, used, j, x, space, vector):
 def _combine(n, used, r, Z, column, x, vector):
     """Σ x_c times the vectors of Z that are used, of r in all."""
     end = whole(n)
+    if used == n:  # the basis is the identity, and all of it is used
+        copy(x, vector, 0, end)
+        return
     fill(0.0, vector, 0, end)
     if r == n:  # the basis is the identity
         for c in range(used):

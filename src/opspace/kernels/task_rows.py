@@ -34,7 +34,7 @@ from opspace.kernels.compiled_scalars import (
 from opspace.kernels.momentum_rows import momentum_task
 from opspace.kernels.motion import A, P, R, V, measure, move_joints, selected
 from opspace.kernels.spring_rows import add_spring
-from opspace.kernels.whole_vectors import add, fill, whole
+from opspace.kernels.whole_vectors import add, fill, put, whole
 from opspace.law.scalars import SIGNS
 from opspace.machine.jit import jit
 
@@ -128,20 +128,26 @@ def _project(work, i, row, block, size, x, e):
     """One task row: the selected combination of the motion's rows, in world or tool axes."""
     number = work.numbers[i]
     J, end = work.J[row], whole(work.v.shape[0])
-    fill(0.0, J, 0, end)
+    empty = True
     error, drift, rate, ahead = 0.0, 0.0, 0.0, 0.0
     for c in range(size):
         factor = selected(work, i, row, c)
         if factor == 0.0:
             continue
         source = block + c
-        add(factor, work.motion_J[0, source], J, 0, end)
+        if empty:
+            put(factor, work.motion_J[0, source], J, 0, end)
+            empty = False
+        else:
+            add(factor, work.motion_J[0, source], J, 0, end)
         # Tool axes turn with the tool, which takes ω × ẋ from the drift and from the desired
         # acceleration alike: it cancels in f* − J̇ q̇ and is left out of both.
         drift += factor * x[A + source]
         error += factor * e[c]
         rate += factor * (number[GOAL_VELOCITY + c] - x[V + source])
         ahead += factor * number[GOAL_ACCELERATION + c]
+    if empty:
+        fill(0.0, J, 0, end)
     work.error[row] = error
     work.drift[row] = drift
     work.wanted[row] = ahead + work.kv[row] * rate

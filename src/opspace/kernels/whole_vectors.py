@@ -51,6 +51,16 @@ def combine(factors, A, first, end, into, begin, width):
             into[c] += factors[k] * A[k, c]
 
 
+@in_vectors(array_vectors.put_combination, types.void)
+def combined(factors, A, first, end, into, width):
+    """Into ← Σ factors[k] A[k] over the rows first to end, of which ``width`` numbers count."""
+    for c in range(width):
+        into[c] = 0.0
+    for k in range(first, end):
+        for c in range(width):
+            into[c] += factors[k] * A[k, c]
+
+
 @in_vectors(array_vectors.add_products, types.void)
 def combine_by_column(A, column, first, end, into, begin, width):
     """Into ← into + Σ A[k, column] A[k] over the rows first to end, from number begin to width."""

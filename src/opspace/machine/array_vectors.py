@@ -125,7 +125,16 @@ def add_combination(
     first: Any, end: Any, into: Any, begin: Any, width: Any,
 ) -> None:  # fmt: skip
     """Emit into ← into + Σ factors[k] A[k] over rows first to end, of numbers begin to width."""
-    _combine(builder, factors, INDEX(1), A, columns, first, end, into, begin, width)
+    value = _combination(builder, factors, INDEX(1), A, columns, first, end)
+    _change(builder, into, begin, width, value)
+
+
+def put_combination(
+    builder: Any, factors: Any, A: Any, columns: Any, first: Any, end: Any, into: Any, width: Any
+) -> None:
+    """Emit into ← Σ factors[k] A[k] over rows first to end, of which ``width`` numbers count."""
+    value = _combination(builder, factors, INDEX(1), A, columns, first, end)
+    _write(builder, into, INDEX(0), width, lambda c: value(c, _zeros(VECTOR)))
 
 
 def add_products(
@@ -134,13 +143,15 @@ def add_products(
 ) -> None:  # fmt: skip
     """Emit into ← into + Σ A[k, column] A[k] over rows first to end, of numbers begin to width."""
     factors = builder.gep(A, [column])
-    _combine(builder, factors, columns, A, columns, first, end, into, begin, width)
+    value = _combination(builder, factors, columns, A, columns, first, end)
+    _change(builder, into, begin, width, value)
 
 
-def _combine(
-    builder: Any, factors: Any, step: Any, A: Any, columns: Any,
-    first: Any, end: Any, into: Any, begin: Any, width: Any,
-) -> None:  # fmt: skip
+def _combination(
+    builder: Any, factors: Any, step: Any, A: Any, columns: Any, first: Any, end: Any
+) -> Callable[[Any, Any], Any]:
+    """Return what adds Σ factors[k step] A[k] over rows first to end to a vector from number c on."""
+
     def column(c: Any, now: Any) -> Any:
         def row(k: Any, total: Any) -> list[Any]:
             factor = builder.load(builder.gep(factors, [builder.mul(k, step)]))
@@ -150,7 +161,7 @@ def _combine(
         (total,) = _loop(builder, first, end, 1, row, [now])
         return total
 
-    _change(builder, into, begin, width, column)
+    return column
 
 
 def add_absolute(builder: Any, x: Any, into: Any, first: Any, end: Any) -> None:

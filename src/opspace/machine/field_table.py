@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from opspace.machine.lanes import whole
-from opspace.machine.record import Handle
+from opspace.machine.lanes import LINE, whole
+from opspace.machine.record import WORD, Handle
 
 WRITERS = {
     "robot": "whoever updates the robot: its library, or the tick where it computes the dynamics",
@@ -108,6 +108,14 @@ WHOLE = "whole "
 """Begins sizes that are rounded up to whole vectors, see `opspace.machine.lanes`."""
 
 
+def _zeros(shape: tuple[int, ...], dtype: type) -> np.ndarray:
+    """Make an array that begins where a line of the cache does."""
+    size = math.prod(shape)
+    memory = np.zeros(size + LINE // WORD, dtype)
+    skipped = -memory.__array_interface__["data"][0] % LINE // WORD
+    return memory[skipped : skipped + size].reshape(shape)
+
+
 class _Extents(dict[Any, Any]):
     """Sizes by name, and what has been worked out from them: sums of products, and shapes."""
 
@@ -174,7 +182,7 @@ class RecordTable:
         arrays: dict[str, Any] = dict(given)
         for field in self.fields:
             if field.name not in given:
-                arrays[field.name] = np.zeros(known[field.shape], field.dtype)
+                arrays[field.name] = _zeros(known[field.shape], field.dtype)
                 if field.start or field.of:
                     self._begin(field, arrays[field.name])
         return Record(self, arrays)

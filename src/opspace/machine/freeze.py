@@ -12,6 +12,7 @@ from llvmlite import ir
 
 from opspace.machine.field_table import RecordTable
 from opspace.machine.kernel_entry import KernelEntry
+from opspace.machine.lanes import LINE
 
 MEMORY = "opspace_memory"
 """Symbol of the memory of such kernels, which is theirs alone."""
@@ -70,6 +71,7 @@ def _memory(module: ir.Module, frozen: Frozen) -> Any:
     """Define the memory, what is constant of it, and the handles; return these."""
     memory: Any = ir.GlobalVariable(module, ir.ArrayType(WORD, frozen.words.size), MEMORY)
     memory.initializer = ir.Constant(memory.value_type, None)
+    memory.align = LINE
     numbers = frozen.words.view(np.int64).tolist()
     places = [(first, first + count) for first, count in frozen.constants]
     places.append((frozen.handles, frozen.words.size))

@@ -5,6 +5,9 @@ from __future__ import annotations
 LANES = 8
 """Numbers in a vector. An arm has no more joints, so that of loops over them nothing is left."""
 
+LINE = 64
+"""Bytes of a line of the cache: a vector that does not lie across two of them is read at once."""
+
 
 def whole(count: int) -> int:
     """Numbers in the whole vectors that hold so many."""

@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from opspace.machine.lanes import LINE
 from opspace.machine.record import WORD, Handle
 
 
@@ -39,10 +40,16 @@ def image(handle: Handle, **beside: Handle) -> Image:
     """Copy everything that handles lead to; what shares memory shares it in the copy."""
     arrays = (array for one in (handle, *beside.values()) for array in _arrays(one))
     regions = _regions(sorted({_extent(array) for array in arrays}))
-    words = [_content(*region) for region in regions]
-    ends = np.cumsum([part.size for part in words]).tolist()
-    begins = dict(zip((start for start, _ in regions), [0, *ends[:-1]], strict=True))
-    starts = np.array(list(begins), np.uintp)
+    words: list[np.ndarray] = []
+    begins: dict[int, int] = {}
+    used = 0
+    for start, end in regions:
+        # As far from a line of the cache as it is now, if the first word begins one.
+        gap = (start // WORD - used) % (LINE // WORD)
+        words += [np.zeros(gap, np.uint64), _content(start, end)]
+        begins[start] = used + gap
+        used += gap + words[-1].size
+    starts, handles = np.array(list(begins), np.uintp), used
 
     def place(array: np.ndarray) -> int:
         address, _ = _extent(array)
@@ -50,7 +57,6 @@ def image(handle: Handle, **beside: Handle) -> Image:
         return begins[start] + (address - start) // WORD
 
     addresses: list[int] = []
-    used = ends[-1]
 
     def put(one: Handle) -> int:
         """Write the words of a handle after those that it leads to."""
@@ -73,7 +79,7 @@ def image(handle: Handle, **beside: Handle) -> Image:
     begin, others = put(handle), {name: put(one) for name, one in beside.items()}
     named = [*_named(handle), *(x for name, one in beside.items() for x in _named(one, f"{name}."))]
     found = {name: place(field) for name, field in named if field.size}
-    return Image(np.concatenate(words), np.array(sorted(addresses)), ends[-1], begin, others, found)
+    return Image(np.concatenate(words), np.array(sorted(addresses)), handles, begin, others, found)
 
 
 def _arrays(handle: Handle) -> Iterator[np.ndarray]:

@@ -100,25 +100,32 @@ static int made_for_these_kernels(const char *stamp)
         && strcmp(stamp + kernels, "-" OPSPACE_MODEL_FORM) == 0;
 }
 
+/* Bytes of a line of the cache: a vector that does not lie across two of them is read at once. */
+enum { LINE = 64 };
+
 /* Whether the memory of kernels of one's own is in use. */
 static int taken;
 
-static uint64_t *take_memory(const opspace_model *m)
+static uint64_t *take_memory(opspace *c)
 {
+    const opspace_model *m = c->model;
     size_t size = (size_t)m->words * sizeof *m->memory;
-    if (!m->memory)
-        return calloc(1, size);
+    if (!m->memory) {
+        c->block = calloc(1, size + LINE);
+        if (!c->block)
+            return NULL;
+        return (uint64_t *)((char *)c->block + (LINE - (uintptr_t)c->block % LINE));
+    }
     if (__atomic_exchange_n(&taken, 1, __ATOMIC_ACQUIRE))
         return NULL;
     return memset(m->memory, 0, size);
 }
 
-static void give_memory_back(const opspace_model *m, uint64_t *words)
+static void give_memory_back(opspace *c)
 {
-    if (words && words == m->memory)
+    if (c->words && c->words == c->model->memory)
         __atomic_store_n(&taken, 0, __ATOMIC_RELEASE);
-    else
-        free(words);
+    free(c->block);
 }
 
 opspace *opspace_open(const opspace_model *model)
@@ -129,7 +136,7 @@ opspace *opspace_open(const opspace_model *model)
     if (!c)
         return NULL;
     c->model = model;
-    c->words = take_memory(model);
+    c->words = take_memory(c);
     c->state = calloc((size_t)(model->nq + model->n), sizeof *c->state);
     if (!c->words || !c->state || !opspace_make_ring(c) || !opspace_make_places(c)
         || !opspace_make_contacts(c) || !opspace_make_fall(c) || !opspace_make_integrals(c)
@@ -150,7 +157,7 @@ opspace *opspace_open(const opspace_model *model)
 void opspace_close(opspace *c)
 {
     if (c) {
-        give_memory_back(c->model, c->words);
+        give_memory_back(c);
         free(c->paper);
         free(c->state);
         free(c->place);

@@ -66,6 +66,7 @@ typedef struct {
 
 struct opspace {
     const opspace_model *model;
+    void *block;
     uint64_t *words;
     void *handle;
     double *q, *v, *tau, *M, *bias, *torque_limit, *torque_middle, *option;
