@@ -29,7 +29,9 @@ MAY_IMPORT = (
     "law.way_columns",
     "law",
     "command",
+    "machine.array_vectors",
     "machine.jit",
+    "machine.lanes",
     "machine.system_calls",
     "robots.joint_kinds",
 )

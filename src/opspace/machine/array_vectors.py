@@ -63,7 +63,7 @@ def in_vectors(emit: Emit, returns: Any) -> Callable[[Callable[..., Any]], Calla
     return register
 
 
-def sum_of_products(builder: Any, x: Any, y: Any, first: Any, end: Any) -> Any:
+def emit_dot(builder: Any, x: Any, y: Any, first: Any, end: Any) -> Any:
     """Emit Σ x y from first to end."""
 
     def body(k: Any, total: Any) -> list[Any]:
@@ -74,7 +74,7 @@ def sum_of_products(builder: Any, x: Any, y: Any, first: Any, end: Any) -> Any:
     return builder.fadd(*(builder.extract_element(pairs, LANE(i)) for i in range(2)))
 
 
-def sums_of_products(
+def emit_dots(
     builder: Any, x: Any, A: Any, columns: Any, count: Any, into: Any, width: Any
 ) -> None:
     """Emit into[b] ← Σ x A[b] for so many rows of A, of which ``width`` numbers count; zeros behind."""
@@ -97,7 +97,7 @@ def sums_of_products(
 
     def rest(b: Any, sums: Any) -> list[Any]:
         row = builder.gep(A, [builder.mul(b, columns)])
-        one = sum_of_products(builder, x, row, zero, width)
+        one = emit_dot(builder, x, row, zero, width)
         here = _compared(builder, FOUR, "==", builder.sub(b, by_four))
         return [builder.select(here, _all(builder, one, FOUR), sums)]
 
@@ -111,7 +111,7 @@ def sums_of_products(
         _store(builder, _zeros(ir.VectorType(DOUBLE, FOUR)), into, end)
 
 
-def add_multiple(builder: Any, factor: Any, x: Any, into: Any, first: Any, end: Any) -> None:
+def emit_add(builder: Any, factor: Any, x: Any, into: Any, first: Any, end: Any) -> None:
     """Emit into ← into + factor · x from first to end."""
     many = _all(builder, factor)
     _change(
@@ -120,7 +120,7 @@ def add_multiple(builder: Any, factor: Any, x: Any, into: Any, first: Any, end: 
     )  # fmt: skip
 
 
-def add_combination(
+def emit_combine(
     builder: Any, factors: Any, A: Any, columns: Any,
     first: Any, end: Any, into: Any, begin: Any, width: Any,
 ) -> None:  # fmt: skip
@@ -129,7 +129,7 @@ def add_combination(
     _change(builder, into, begin, width, value)
 
 
-def put_combination(
+def emit_combined(
     builder: Any, factors: Any, A: Any, columns: Any, first: Any, end: Any, into: Any, width: Any
 ) -> None:
     """Emit into ← Σ factors[k] A[k] over rows first to end, of which ``width`` numbers count."""
@@ -137,7 +137,7 @@ def put_combination(
     _write(builder, into, INDEX(0), width, lambda c: value(c, _zeros(VECTOR)))
 
 
-def add_products(
+def emit_combine_by_column(
     builder: Any, A: Any, columns: Any, column: Any,
     first: Any, end: Any, into: Any, begin: Any, width: Any,
 ) -> None:  # fmt: skip
@@ -164,7 +164,7 @@ def _combination(
     return column
 
 
-def add_absolute(builder: Any, x: Any, into: Any, first: Any, end: Any) -> None:
+def emit_add_sizes(builder: Any, x: Any, into: Any, first: Any, end: Any) -> None:
     """Emit into ← into + |x| from first to end."""
     kind = ir.FunctionType(VECTOR, [VECTOR])
     size = cgutils.get_or_insert_function(builder.module, kind, f"llvm.fabs.v{LANES}f64")
@@ -174,24 +174,24 @@ def add_absolute(builder: Any, x: Any, into: Any, first: Any, end: Any) -> None:
     )  # fmt: skip
 
 
-def put_multiple(builder: Any, factor: Any, x: Any, into: Any, first: Any, end: Any) -> None:
+def emit_put(builder: Any, factor: Any, x: Any, into: Any, first: Any, end: Any) -> None:
     """Emit into ← factor · x from first to end."""
     many = _all(builder, factor)
     _write(builder, into, first, end, lambda k: builder.fmul(many, _load(builder, x, k)))
 
 
-def put_same(builder: Any, x: Any, into: Any, first: Any, end: Any) -> None:
+def emit_copy(builder: Any, x: Any, into: Any, first: Any, end: Any) -> None:
     """Emit into ← x from first to end."""
     _write(builder, into, first, end, lambda k: _load(builder, x, k))
 
 
-def put_all(builder: Any, value: Any, into: Any, first: Any, end: Any) -> None:
+def emit_fill(builder: Any, value: Any, into: Any, first: Any, end: Any) -> None:
     """Emit into ← value from first to end."""
     many = _all(builder, value)
     _write(builder, into, first, end, lambda k: many)
 
 
-def put_unit(builder: Any, value: Any, place: Any, into: Any, width: Any) -> None:
+def emit_put_unit(builder: Any, value: Any, place: Any, into: Any, width: Any) -> None:
     """Emit into ← value at one place, zeros elsewhere."""
     many = _all(builder, value)
     _write(
@@ -200,7 +200,7 @@ def put_unit(builder: Any, value: Any, place: Any, into: Any, width: Any) -> Non
     )  # fmt: skip
 
 
-def put_at(builder: Any, value: Any, place: Any, into: Any) -> None:
+def emit_put_at(builder: Any, value: Any, place: Any, into: Any) -> None:
     """Emit into[place] ← value in the vector that holds it: nobody waits for a part of it then."""
     start = builder.and_(place, INDEX(-LANES))
     here = _compared(builder, LANES, "==", builder.sub(place, start))
@@ -212,13 +212,13 @@ def put_at(builder: Any, value: Any, place: Any, into: Any) -> None:
     )
 
 
-def zero_after(builder: Any, x: Any, count: Any, end: Any) -> None:
+def emit_clear_after(builder: Any, x: Any, count: Any, end: Any) -> None:
     """Emit zeros from number ``count`` of x to end."""
     start = builder.and_(count, INDEX(-LANES))
     _change(builder, x, start, end, lambda k, now: _kept(builder, now, "<", builder.sub(count, k)))
 
 
-def zero_before(builder: Any, x: Any, count: Any) -> None:
+def emit_clear_before(builder: Any, x: Any, count: Any) -> None:
     """Emit zeros before number ``count`` of x, from the start of its vector."""
     start = builder.and_(count, INDEX(-LANES))
     _store(
@@ -226,7 +226,7 @@ def zero_before(builder: Any, x: Any, count: Any) -> None:
     )
 
 
-def take_first(builder: Any, x: Any, into: Any, count: Any) -> None:
+def emit_take_first(builder: Any, x: Any, into: Any, count: Any) -> None:
     """Emit into ← x of so many numbers; of ``into`` no more is written."""
     kind = ir.VectorType(ir.IntType(1), LANES)
     asked = ir.FunctionType(ir.VoidType(), [VECTOR, VECTOR.as_pointer(), LANE, kind])
@@ -242,7 +242,7 @@ def take_first(builder: Any, x: Any, into: Any, count: Any) -> None:
     _loop(builder, INDEX(0), count, LANES, body)
 
 
-def put_products(builder: Any, x: Any, y: Any, into: Any, first: Any, end: Any) -> None:
+def emit_put_products(builder: Any, x: Any, y: Any, into: Any, first: Any, end: Any) -> None:
     """Emit into ← x y, number by number, from first to end."""
     _write(
         builder, into, first, end,
@@ -250,7 +250,7 @@ def put_products(builder: Any, x: Any, y: Any, into: Any, first: Any, end: Any) 
     )  # fmt: skip
 
 
-def put_first(builder: Any, factor: Any, x: Any, into: Any, count: Any) -> None:
+def emit_put_first(builder: Any, factor: Any, x: Any, into: Any, count: Any) -> None:
     """Emit into ← factor · x of so many numbers, zeros behind; of x no more is read."""
     kind = ir.VectorType(ir.IntType(1), LANES)
     asked = ir.FunctionType(VECTOR, [VECTOR.as_pointer(), LANE, kind, VECTOR])
