@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from opspace.kernels.algebra import cholesky, singular_values
 from opspace.kernels.compiled_scalars import profile, ramp
 from opspace.kernels.corners import sort_corners
-from opspace.kernels.walk import begin, pass_on, slot_bit, walk
+from opspace.kernels.walk import begin, slot_bit, start_at, walk
 from opspace.law import SigmaBuffer, TaskSet, blended_torque, corners
 from opspace.law.activation import PROFILES, Profile, Ramp
 from opspace.law.hierarchy import whiten
@@ -59,9 +59,8 @@ def compiled_torque(L, tasks, blend, buffer):
     space = SPACE.make(size.by_name(), {"inertia": make_inertia(np.arange(n) - 1)})
     s = space.handle()
     levels = len(ranks) + 1
-    begin(n, levels, s)
-    pass_on(0, n, s)
-    space.path[1] = 1.0
+    begin(levels, s)
+    start_at(1, n, s)
     u = np.zeros(n)
     J = np.zeros((row, whole(n)))
     J[:, :n] = np.concatenate([np.zeros((0, n)), *(whitened[k].J for k in order)])

@@ -19,6 +19,7 @@ from opspace.kernels.stance_columns import (
     SOLE_ROWS,
     SURFACE,
 )
+from opspace.kernels.walk import start_at
 from opspace.law.scalars import STILLING, TINY
 from opspace.machine.jit import jit
 
@@ -128,12 +129,7 @@ def close_contacts(work, links):
     what the ground holds.
     """
     stance, space, n = work.stance, work.space, work.v.shape[0]
-    for a in range(n):
-        space.u[0, a] = 0.0
-        for b in range(n):
-            space.Z[0, a, b] = 0.0
-        space.Z[0, a, a] = 1.0
-    space.free[0] = n
+    start_at(0, n, space)
     count = 0
     for c in range(stance.count[0]):
         if stance.motion[c] >= 1.0:

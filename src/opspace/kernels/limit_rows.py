@@ -214,7 +214,7 @@ def realise(work, stacks, n):
     gave_way = leave_room(work, stacks, n)
     if gave_way:
         _torque_of_acceleration(work, n)
-    outside = _motors_exceeded(work, n) or find_excess(work, n) > BROKEN
+    outside = _motors_exceeded(work, n) or exceeds(work, n, BROKEN)
     if outside or approach(work) > BROKEN:
         task_metric(work, stacks)
         nearest_acceleration(work.inertia, work.joint_acceleration, work.bounds, work.distances)
@@ -258,7 +258,7 @@ def _acting(work, n):
             bits |= COLLISION
     if will_close(work):
         bits |= COLLISION_LOST
-    if find_excess(work, n) > LOST or will_pass(work):
+    if exceeds(work, n, LOST) or will_pass(work):
         bits |= LIMIT_LOST
     return bits
 
@@ -284,16 +284,15 @@ def _motors_exceeded(work, n):
 
 
 @jit
-def find_excess(work, n):
-    """The largest excess over what a joint may do, see `opspace.law.excess`."""
-    most = -math.inf
+def exceeds(work, n, tolerance):
+    """Whether a joint does more than it may by more than a tolerance, see `opspace.law.excess`."""
     x, lower, upper = work.joint_acceleration, work.bounds.lower, work.bounds.upper
     for a in range(n):
-        if upper[a] < UNBOUNDED:
-            most = max(most, (x[a] - upper[a]) / max(1.0, abs(upper[a])))
-        if lower[a] > -UNBOUNDED:
-            most = max(most, (lower[a] - x[a]) / max(1.0, abs(lower[a])))
-    return most
+        if upper[a] < UNBOUNDED and x[a] - upper[a] > tolerance * max(1.0, abs(upper[a])):
+            return True
+        if lower[a] > -UNBOUNDED and lower[a] - x[a] > tolerance * max(1.0, abs(lower[a])):
+            return True
+    return False
 
 
 @jit
@@ -317,9 +316,20 @@ def find_bounds(work, n):
         else:
             bounds.lower[j] = limit[SHIFT] - limit[COMMAND]
             bounds.left[n + j] = limit[BY_POSITION] - limit[SHIFT]
+    for a in range(n):
+        if bounds.lower[a] > bounds.upper[a]:
+            _let_stop(work)
+            return
+
+
+@jit
+def _let_stop(work):
+    """Let who must stop at once do so, whatever the speed limit behind it would say.
+
+    And what a joint does more towards one limit in the middle of the tick it does less towards the other.
+    """
+    bounds = work.bounds
     for i in range(work.limit.shape[0]):
-        # Who must stop at once may do so, whatever the speed limit behind it would say, and what a joint
-        # does more towards one limit in the middle of the tick it does less towards the other.
         limit, j = work.limit[i], work.limit_joint[i]
         apart = bounds.lower[j] - bounds.upper[j]
         if apart > 0.0 and limit[SIGN] > 0.0:

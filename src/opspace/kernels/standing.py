@@ -12,7 +12,7 @@ from opspace.kernels.contact_rows import component_of, take_rows
 from opspace.kernels.distances import approach, will_close
 from opspace.kernels.inertia import acceleration_of, torque_of
 from opspace.kernels.limit_columns import MARGIN, SIGN
-from opspace.kernels.limit_rows import find_bounds, find_excess, will_pass
+from opspace.kernels.limit_rows import exceeds, find_bounds, will_pass
 from opspace.kernels.stance_columns import BASE_SIZE, EACH, NORMAL, PLACE_FIRST, PLACE_ROWS
 from opspace.law.scalars import (
     BARELY,
@@ -77,7 +77,7 @@ def stand(work, stacks, closings):
         bits |= _acting(work)
     for a in range(BASE_SIZE):
         work.tau[a] = 0.0
-    if find_excess(work, n) > LOST or will_pass(work):
+    if exceeds(work, n, LOST) or will_pass(work):
         bits |= LIMIT_LOST
     for c in range(stance.count[0]):
         _tell(work, c)

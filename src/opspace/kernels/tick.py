@@ -52,7 +52,7 @@ from opspace.kernels.limit_columns import COMMAND, SIGN
 from opspace.kernels.limit_rows import begin_limits, insert_limits, keep_bounds
 from opspace.kernels.standing import stand
 from opspace.kernels.task_rows import evaluate_tasks
-from opspace.kernels.walk import begin, keep_inside, pass_on, slot_bit, walk
+from opspace.kernels.walk import begin, keep_inside, pass_on, slot_bit, start_at, walk
 from opspace.kernels.whole_vectors import dot, put, whole
 from opspace.law.scalars import CHAINED, EXACT, MOST_UNREST, NO_GROUP
 from opspace.law.scalars import SCALED as GIVEN_WAY
@@ -311,8 +311,9 @@ def law(t, work, stacks, limit_stacks):
         unrest_of_rows(t, work, n)
     for a in range(n):
         work.u[a] = 0.0
-    begin(n, levels, space)
+    begin(levels, space)
     if work.option[BASE] == 0.0:
+        start_at(0 if limit_stacks > 0 else 1, n, space)
         _above_tasks(work, 1.0, stacks, limit_stacks, levels)
         return 1
     closings = contact_corners(work)
@@ -327,7 +328,8 @@ def _above_tasks(work, weight, stacks, limit_stacks, levels):
     """Add the stacks below the joint limits that take part, with some weight."""
     space = work.space
     if limit_stacks == 0:
-        pass_on(0, work.v.shape[0], space)
+        if work.option[BASE] != 0.0:
+            pass_on(0, work.v.shape[0], space)
         space.path[1] = weight
         _walk(work, stacks, levels)
         return

@@ -16,20 +16,24 @@ FIRST, END, NEXT, GROUP, GROUP_END, ALTERNATIVE = range(6)
 
 
 @jit
-def begin(n, levels, space):
-    """Nothing decided, everything free: u [√J/s], Z, free at depth 0; nothing known about any level."""
-    u, Z, top, got = space.u, space.Z, space.top, space.got
-    fill(0.0, u[0], 0, whole(n))
-    for a in range(n):
-        put_unit(1.0, a, Z[0, a], whole(n))
-    space.free[0] = n
-    space.path[0] = 1.0
+def begin(levels, space):
+    """Nothing is known about any level."""
     for d in range(levels + 1):
-        top[d] = 0.0
-        got[d, 0], got[d, 1] = 0.0, 0.0
+        space.top[d] = 0.0
+        space.got[d, 0], space.got[d, 1] = 0.0, 0.0
+
+
+@jit
+def start_at(d, n, space):
+    """Nothing is decided above depth d, and everything free: u [√J/s], Z, free, path, torque [N·m]."""
+    fill(0.0, space.u[d], 0, whole(n))
+    for a in range(n):
+        put_unit(1.0, a, space.Z[d, a], whole(n))
+    space.free[d] = n
+    space.path[d] = 1.0
     if space.motors[0] != 0:
         for a in range(n):
-            space.torque[0, a] = space.start[a]
+            space.torque[d, a] = space.start[a]
 
 
 @jit

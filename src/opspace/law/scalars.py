@@ -319,7 +319,7 @@ def allowed_speed(d: float, brake: float, k1: float) -> tuple[float, float]:
     if d < 0.0:
         x = k1 * d / RETURN_SPEED
         return RETURN_SPEED * math.tanh(x), k1 / math.cosh(min(-x, 300.0)) ** 2
-    knee = brake / (k1 * k1)
+    knee = brake * (1.0 / (k1 * k1))
     if d <= knee:
         return k1 * d, k1
     v = math.sqrt(2.0 * brake * (d - 0.5 * knee))
