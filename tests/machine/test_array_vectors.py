@@ -50,6 +50,7 @@ def arguments(name, rng, count, rows):
     }
     arrays = {
         "A": rng.normal(size=(ROWS, WIDTH)),
+        "F": rng.normal(size=(ROWS, WIDTH)),
         "factors": rng.normal(size=ROWS),
         "x": rng.normal(size=WIDTH),
         "y": rng.normal(size=WIDTH),

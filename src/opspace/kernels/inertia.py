@@ -32,18 +32,30 @@ def factor(M, inertia):
     Returns:
         Whether M is positive definite; otherwise U is not usable.
     """
-    L, end = inertia.L, inertia.end
-    for a in range(L.shape[0] - 1, -1, -1):
-        row, size = L[a], whole(a + 1)
-        put_first(-1.0, M[a], row, a + 1)
-        combine_by_column(L, a, a + 1, end[a], row, 0, size)
-        square = -row[a]
-        if not square > 0.0:
+    L, n = inertia.L, inertia.L.shape[0]
+    for a in range(n - 1, -1, -1):
+        if not _eliminate(M, a, inertia):
             return False
-        put(-1.0 / math.sqrt(square), row, row, 0, size)
-        clear_after(row, a + 1, size)
+    for a in range(n):  # by themselves, since the next row would wait for each root
+        put(1.0 / math.sqrt(L[a, a]), L[a], L[a], 0, whole(a + 1))
+        clear_after(L[a], a + 1, whole(a + 1))
     _invert(inertia)
     return True
+
+
+@jit
+def _eliminate(M, a, inertia):
+    """Take from row a of M, into L, what all that a carries does of it; and divide by what is left at a.
+
+    Returns:
+        Whether that is above zero.
+    """
+    L, scaled, size = inertia.L, inertia.white, whole(a + 1)
+    put_first(1.0, M[a], L[a], a + 1)
+    combine_by_column(L, a, scaled, a + 1, inertia.end[a], L[a], 0, size)
+    left = L[a, a]
+    put(-1.0 / left, L[a], scaled[a], 0, size)
+    return left > 0.0
 
 
 @jit
@@ -59,7 +71,7 @@ def _invert(inertia):
 
 @jit
 def _combine_chain(factors, A, inertia, last, into):
-    """Into ← into + Σ factors[k] A[k] over all k from ``last`` to the base; A is lower triangular."""
+    """Add Σ factors[k] A[k] to ``into`` over all k from ``last`` to the base; A is lower triangular."""
     start, before = inertia.start, inertia.before
     while last >= 0:
         first = start[last]

@@ -326,7 +326,7 @@ def find_bounds(work, n):
 def _let_stop(work):
     """Let who must stop at once do so, whatever the speed limit behind it would say.
 
-    And what a joint does more towards one limit in the middle of the tick it does less towards the other.
+    What a joint does more towards one limit in the middle of the tick it does less towards the other.
     """
     bounds = work.bounds
     for i in range(work.limit.shape[0]):

@@ -280,9 +280,8 @@ def unrest_of_rows(t, work, n):
             if work.row_near[row] > 0.0:
                 unrest = MOST_UNREST
                 if work.h[i] > 0.0:
-                    weight = work.row_weight[row]
                     now = unrest_of(
-                        work.row_near[row], work.error[row], speed, 1.0 / (weight * weight)
+                        work.row_near[row], work.error[row], speed, work.row_reference[row]
                     )
                     unrest = remembered_unrest(work.row_unrest[row], math.sqrt(now), passed)
                 work.row_unrest[row] = unrest

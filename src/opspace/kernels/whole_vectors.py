@@ -38,7 +38,7 @@ whole_before = jit(whole_before_of)
 
 @in_vectors(emit_dot, types.float64)
 def dot(x, y, first, end):
-    """Σ x y from first to end."""
+    """Return Σ x y from first to end."""
     total = 0.0
     for k in range(first, end):
         total += x[k] * y[k]
@@ -47,7 +47,7 @@ def dot(x, y, first, end):
 
 @in_vectors(emit_dots, types.void)
 def dots(x, A, count, into, width):
-    """into[b] ← Σ x A[b] for so many rows of A, of which ``width`` numbers count; zeros behind."""
+    """Fill so many numbers of ``into`` with Σ x A[b], over ``width`` numbers of each row; zeros behind."""
     clear_after(into, count, whole(count))
     for b in range(count):
         total = 0.0
@@ -58,14 +58,14 @@ def dots(x, A, count, into, width):
 
 @in_vectors(emit_add, types.void)
 def add(factor, x, into, first, end):
-    """Into ← into + factor · x from first to end."""
+    """Add factor · x to ``into`` from first to end."""
     for k in range(first, end):
         into[k] += factor * x[k]
 
 
 @in_vectors(emit_combine, types.void)
 def combine(factors, A, first, end, into, begin, width):
-    """Into ← into + Σ factors[k] A[k] over the rows first to end, from number begin to width."""
+    """Add Σ factors[k] A[k] over the rows first to end to ``into``, from number begin to width."""
     for k in range(first, end):
         for c in range(begin, width):
             into[c] += factors[k] * A[k, c]
@@ -73,7 +73,7 @@ def combine(factors, A, first, end, into, begin, width):
 
 @in_vectors(emit_combined, types.void)
 def combined(factors, A, first, end, into, width):
-    """Into ← Σ factors[k] A[k] over the rows first to end, of which ``width`` numbers count."""
+    """Fill ``into`` with Σ factors[k] A[k] over the rows first to end, of which ``width`` numbers count."""
     for c in range(width):
         into[c] = 0.0
     for k in range(first, end):
@@ -82,44 +82,44 @@ def combined(factors, A, first, end, into, width):
 
 
 @in_vectors(emit_combine_by_column, types.void)
-def combine_by_column(A, column, first, end, into, begin, width):
-    """Into ← into + Σ A[k, column] A[k] over the rows first to end, from number begin to width."""
+def combine_by_column(F, column, A, first, end, into, begin, width):
+    """Add Σ F[k, column] A[k] over the rows first to end to ``into``, from number begin to width."""
     for k in range(first, end):
         for c in range(begin, width):
-            into[c] += A[k, column] * A[k, c]
+            into[c] += F[k, column] * A[k, c]
 
 
 @in_vectors(emit_put, types.void)
 def put(factor, x, into, first, end):
-    """Into ← factor · x from first to end."""
+    """Fill ``into`` with factor · x from first to end."""
     for k in range(first, end):
         into[k] = factor * x[k]
 
 
 @in_vectors(emit_add_sizes, types.void)
 def add_sizes(x, into, first, end):
-    """Into ← into + |x| from first to end."""
+    """Add |x| to ``into`` from first to end."""
     for k in range(first, end):
         into[k] += abs(x[k])
 
 
 @in_vectors(emit_copy, types.void)
 def copy(x, into, first, end):
-    """Into ← x from first to end."""
+    """Fill ``into`` with x from first to end."""
     for k in range(first, end):
         into[k] = x[k]
 
 
 @in_vectors(emit_fill, types.void)
 def fill(value, into, first, end):
-    """Into ← value from first to end."""
+    """Fill ``into`` with a value from first to end."""
     for k in range(first, end):
         into[k] = value
 
 
 @in_vectors(emit_put_first, types.void)
 def put_first(factor, x, into, count):
-    """Into ← factor · x of so many numbers, zeros behind; x itself need not be padded."""
+    """Fill so many numbers of ``into`` with factor · x, zeros behind; x itself need not be padded."""
     clear_after(into, count, whole(count))
     for k in range(count):
         into[k] = factor * x[k]
@@ -127,21 +127,21 @@ def put_first(factor, x, into, count):
 
 @in_vectors(emit_take_first, types.void)
 def take_first(x, into, count):
-    """Into ← x of so many numbers; ``into`` itself need not be padded."""
+    """Fill so many numbers of ``into`` with x; ``into`` itself need not be padded."""
     for k in range(count):
         into[k] = x[k]
 
 
 @in_vectors(emit_put_products, types.void)
 def put_products(x, y, into, first, end):
-    """Into ← x y, number by number, from first to end."""
+    """Fill ``into`` with x y, number by number, from first to end."""
     for k in range(first, end):
         into[k] = x[k] * y[k]
 
 
 @in_vectors(emit_put_unit, types.void)
 def put_unit(value, place, into, width):
-    """Into ← value at one place, zeros elsewhere."""
+    """Fill ``into`` with a value at one place and zeros elsewhere."""
     for k in range(width):
         into[k] = 0.0
     into[place] = value
@@ -149,19 +149,19 @@ def put_unit(value, place, into, width):
 
 @in_vectors(emit_put_at, types.void)
 def put_at(value, place, into):
-    """into[place] ← value, where the vectors around it are used at once."""
+    """Put a value at one place of ``into``, where the vectors around it are used at once."""
     into[place] = value
 
 
 @in_vectors(emit_clear_after, types.void)
 def clear_after(x, count, end):
-    """Zeros from number ``count`` of x to end."""
+    """Fill x with zeros from number ``count`` to end."""
     for k in range(count, end):
         x[k] = 0.0
 
 
 @in_vectors(emit_clear_before, types.void)
 def clear_before(x, count):
-    """Zeros before number ``count`` of x, from where its vector begins."""
+    """Fill x with zeros before number ``count``, from where its vector begins."""
     for k in range(whole_before(count), count):
         x[k] = 0.0

@@ -138,12 +138,11 @@ def emit_combined(
 
 
 def emit_combine_by_column(
-    builder: Any, A: Any, columns: Any, column: Any,
+    builder: Any, F: Any, step: Any, column: Any, A: Any, columns: Any,
     first: Any, end: Any, into: Any, begin: Any, width: Any,
 ) -> None:  # fmt: skip
-    """Emit into ← into + Σ A[k, column] A[k] over rows first to end, of numbers begin to width."""
-    factors = builder.gep(A, [column])
-    value = _combination(builder, factors, columns, A, columns, first, end)
+    """Emit into ← into + Σ F[k, column] A[k] over rows first to end, of numbers begin to width."""
+    value = _combination(builder, builder.gep(F, [column]), step, A, columns, first, end)
     _change(builder, into, begin, width, value)
 
 

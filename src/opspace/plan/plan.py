@@ -332,7 +332,9 @@ class Plan:
         first = 0
         for i, member in enumerate(self.members):
             entry = pack(member, i, first, self.axes, self.tick, presses)
-            self.tick.row_weight[entry.rows] = 1.0 / np.sqrt(scales.reference(member.task))
+            reference = scales.reference(member.task)
+            self.tick.row_reference[entry.rows] = reference
+            self.tick.row_weight[entry.rows] = 1.0 / np.sqrt(reference)
             self.tick.row_near[entry.rows] = scales.near(member.task)
             first = entry.rows.stop
             packed.append(entry)

@@ -164,6 +164,7 @@ TICK = RecordTable(
     _tuned("press", ("presses", PRESS_SIZE), "force tasks, see `opspace.law.press_columns`"),
     _work("press_axes", (6, 6), "rows of a force task in world axes"),
     _plan("row_weight", ("rows",), "1/√reference", start=1.0),
+    _plan("row_reference", ("rows",), "σ that is usual for each", "1/kg, 1/(kg·m²)", start=1.0),
     _plan("row_near", ("rows",), "1/e₀ of `opspace.law.scalars.unrest_of`", "1/m, 1/rad"),
     _kept("row_unrest", ("rows",), "how far each row was from rest lately", start=MOST_UNREST),
     _kept("unrest_at", (1,), "time of the tick that this is of", "s", start=math.inf),
