@@ -47,7 +47,7 @@ def dot(x, y, first, end):
 
 @in_vectors(emit_dots, types.void)
 def dots(x, A, count, into, width):
-    """Fill so many numbers of ``into`` with Σ x A[b], over ``width`` numbers of each row; zeros behind."""
+    """Fill so many numbers of ``into`` with Σ x A[b] over ``width`` numbers; zeros behind."""
     clear_after(into, count, whole(count))
     for b in range(count):
         total = 0.0
@@ -73,7 +73,7 @@ def combine(factors, A, first, end, into, begin, width):
 
 @in_vectors(emit_combined, types.void)
 def combined(factors, A, first, end, into, width):
-    """Fill ``into`` with Σ factors[k] A[k] over the rows first to end, of which ``width`` numbers count."""
+    """Fill ``into`` with Σ factors[k] A[k] over the rows first to end, ``width`` numbers of each."""
     for c in range(width):
         into[c] = 0.0
     for k in range(first, end):
