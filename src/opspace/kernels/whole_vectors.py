@@ -66,27 +66,31 @@ def add(factor, x, into, first, end):
 @in_vectors(emit_combine, types.void)
 def combine(factors, A, first, end, into, begin, width):
     """Add Σ factors[k] A[k] over the rows first to end to ``into``, from number begin to width."""
-    for k in range(first, end):
-        for c in range(begin, width):
-            into[c] += factors[k] * A[k, c]
+    for c in range(begin, width):
+        total = into[c]
+        for k in range(first, end):
+            total += factors[k] * A[k, c]
+        into[c] = total
 
 
 @in_vectors(emit_combined, types.void)
 def combined(factors, A, first, end, into, width):
     """Fill ``into`` with Σ factors[k] A[k] over the rows first to end, ``width`` numbers of each."""
     for c in range(width):
-        into[c] = 0.0
-    for k in range(first, end):
-        for c in range(width):
-            into[c] += factors[k] * A[k, c]
+        total = 0.0
+        for k in range(first, end):
+            total += factors[k] * A[k, c]
+        into[c] = total
 
 
 @in_vectors(emit_combine_by_column, types.void)
 def combine_by_column(F, column, A, first, end, into, begin, width):
     """Add Σ F[k, column] A[k] over the rows first to end to ``into``, from number begin to width."""
-    for k in range(first, end):
-        for c in range(begin, width):
-            into[c] += F[k, column] * A[k, c]
+    for c in range(begin, width):
+        total = into[c]
+        for k in range(first, end):
+            total += F[k, column] * A[k, c]
+        into[c] = total
 
 
 @in_vectors(emit_put, types.void)
