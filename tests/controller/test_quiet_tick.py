@@ -3,6 +3,7 @@
 import pickle
 import threading
 import tracemalloc
+import weakref
 
 import numpy as np
 import pytest
@@ -94,6 +95,14 @@ def test_torques_that_somebody_has_stay_as_they_were(kept, view):
             assert ours.tobytes() == expected.tobytes()
         assert len({ours.ctypes.data for ours, _ in held}) == len(held)
     assert quiet.looks <= 2
+
+
+def test_a_torque_that_nobody_has_is_an_array_again():
+    quiet = controller_of(Counting)
+    for k in range(3):  # from then on ticks are quiet
+        last = weakref.ref(quiet.step(k * DT, *state(k)).tau)
+    for k in range(3, 20):
+        assert quiet.step(k * DT, *state(k)).tau is last()
 
 
 def reshape(tau):

@@ -72,9 +72,10 @@ def test_compiled_is_what_is_written(both, seed, count, rows):
 
 
 @pytest.mark.parametrize("count", range(2 * LANES + 1))
-def test_what_is_not_padded_is_not_read_nor_written_behind_its_end(count):
+def test_what_is_not_padded_is_not_used_nor_written_behind_its_end(count):
     put, take = call_of("put_first"), call_of("take_first")
-    row, into = np.arange(1.0, count + 1.0), np.full(3 * LANES, -1.0)
+    row = np.append(np.arange(1.0, count + 1.0), np.full(BEHIND, np.nan))[:count]
+    into = np.full(3 * LANES, -1.0)
     put(2.0, row, into, count)
     np.testing.assert_array_equal(into[:count], 2.0 * row)
     assert not into[count : whole(count)].any()

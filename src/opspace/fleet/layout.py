@@ -28,20 +28,9 @@ FROZEN = (
 BEGUN = ("kind", "numbers", "limit", "press")
 """What the plan begins and a tick goes on with, each robot for itself."""
 EMPTY = (
-    *(
-        "L",
-        "across",
-        "motors",
-        "M",
-        "bias",
-        "placement",
-        "velocity",
-        "acceleration",
-        "force",
-        "inertia",
-    ),
-    *("count", "rows", "remembered", "spring", "kp", "kv"),
-)
+    "L", "across", "motors", "M", "bias", "placement", "velocity", "acceleration", "force", "inertia",
+    "count", "rows", "remembered", "spring", "kp", "kv",
+)  # fmt: skip
 """What a tick does not write everywhere and reads as zero there: a fleet stands on nothing, and springs
 have no gains."""
 

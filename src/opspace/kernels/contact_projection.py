@@ -30,7 +30,7 @@ from opspace.kernels.stance_columns import (
     PLACE_FIRST,
     PLACE_ROWS,
 )
-from opspace.kernels.whole_vectors import whole
+from opspace.kernels.whole_vectors import clear_after, whole
 from opspace.law.scalars import (
     BROKEN,
     CLEANINGS,
@@ -211,8 +211,7 @@ def _equations(work, free, size):
             E[b, k] = stance.torques[k, b]
         for i in range(stance.rows[0]):
             E[b, free + i] = -stance.J[i, b] * stance.loose[i]
-        for k in range(size, whole(size)):
-            E[b, k] = 0.0
+        clear_after(E[b], size, whole(size))
     householder(E, BASE_SIZE, size, stance.scale, stance.lower)
     for i in range(BASE_SIZE):
         for j in range(BASE_SIZE):

@@ -293,7 +293,10 @@ def _loop(
     builder: Any, first: Any, end: Any, step: int, body: Callable[..., list[Any]],
     start: Sequence[Any] = (),
 ) -> list[Any]:  # fmt: skip
-    """Emit a loop from first to end, and return what it hands on."""
+    """Emit a loop from first to end, and return what it hands on.
+
+    By the names of its blocks `opspace.machine.translate` finds it, so that it is not unrolled.
+    """
     before = builder.block
     loop, after = builder.append_basic_block("vectors"), builder.append_basic_block("after")
     builder.cbranch(builder.icmp_signed("<", first, end), loop, after)

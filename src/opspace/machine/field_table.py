@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from opspace.machine.lanes import LINE, whole
-from opspace.machine.record import WORD, Handle
+from opspace.machine.record import WORD, Handle, address_of
 
 WRITERS = {
     "robot": "whoever updates the robot: its library, or the tick where it computes the dynamics",
@@ -27,6 +27,9 @@ LIVES = {
     "tick": "until the next tick",
     "scratch": "within a tick",
 }
+
+WHOLE = "whole "
+"""Begins sizes that are rounded up to whole vectors, see `opspace.machine.lanes`."""
 
 
 class Field(NamedTuple):
@@ -104,15 +107,11 @@ class Block:
         return part
 
 
-WHOLE = "whole "
-"""Begins sizes that are rounded up to whole vectors, see `opspace.machine.lanes`."""
-
-
-def _zeros(shape: tuple[int, ...], dtype: type) -> np.ndarray:
-    """Make an array that begins where a line of the cache does."""
+def _lined_up(shape: tuple[int, ...], dtype: type) -> np.ndarray:
+    """Make an array that begins where a line of the cache does, at twice the cost of any other."""
     size = math.prod(shape)
     memory = np.zeros(size + LINE // WORD, dtype)
-    skipped = -memory.__array_interface__["data"][0] % LINE // WORD
+    skipped = -address_of(memory) % LINE // WORD
     return memory[skipped : skipped + size].reshape(shape)
 
 
@@ -182,7 +181,8 @@ class RecordTable:
         arrays: dict[str, Any] = dict(given)
         for field in self.fields:
             if field.name not in given:
-                arrays[field.name] = _zeros(known[field.shape], field.dtype)
+                make = _lined_up if field.name in self._padded else np.zeros
+                arrays[field.name] = make(known[field.shape], field.dtype)
                 if field.start or field.of:
                     self._begin(field, arrays[field.name])
         return Record(self, arrays)
@@ -209,6 +209,11 @@ class RecordTable:
     @cached_property
     def _by_name(self) -> dict[str, Field]:
         return {field.name: field for field in self.fields}
+
+    @cached_property
+    def _padded(self) -> set[str]:
+        sizes = ((field.name, field.shape[-1]) for field in self.fields if field.shape)
+        return {name for name, size in sizes if type(size) is str and size.startswith(WHOLE)}
 
     @cached_property
     def _reported(self) -> list[Field]:

@@ -1,9 +1,9 @@
-"""How long vectors are: rows that are worked on by vectors are padded with zeros to whole ones."""
+"""How long vectors are, and where they should begin: rows are padded with zeros to whole ones."""
 
 from __future__ import annotations
 
 LANES = 8
-"""Numbers in a vector. An arm has no more joints, so that of loops over them nothing is left."""
+"""Numbers in a vector. Most arms have no more joints: a loop over them ends with its first turn."""
 
 LINE = 64
 """Bytes of a line of the cache: a vector that does not lie across two of them is read at once."""

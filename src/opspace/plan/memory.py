@@ -161,9 +161,9 @@ def make_inertia(before: np.ndarray) -> Record:
             carried[before[a]] += carried[a]
     if not np.array_equal(end - np.arange(n), carried):
         return make_inertia(np.arange(n) - 1)
-    start = np.arange(n)
-    for a in range(1, n):
-        if before[a] == a - 1:
-            start[a] = start[a - 1]
-    given = {"before": np.array(before, np.int64), "start": start, "end": end}
+    start = list(range(n))
+    for a, b in enumerate(before.tolist()):
+        if 0 <= b == a - 1:
+            start[a] = start[b]
+    given = {"before": np.array(before, np.int64), "start": np.array(start, np.int64), "end": end}
     return INERTIA.make({"n": n}, given)
