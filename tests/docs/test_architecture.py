@@ -32,6 +32,7 @@ MAY_IMPORT = (
     "machine.array_vectors",
     "machine.jit",
     "machine.lanes",
+    "machine.sine_vectors",
     "machine.system_calls",
     "robots.joint_kinds",
 )

@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 from opspace.kernels import whole_vectors as under_test
 from opspace.machine.jit import jit
 from opspace.machine.lanes import LANES, whole, whole_before
+from opspace.machine.sine_vectors import FAR
 from tests.budget import examples
 
 ROWS, WIDTH, BEHIND = 6, 3 * LANES, 4
@@ -55,6 +56,9 @@ def arguments(name, rng, count, rows):
         "x": rng.normal(size=WIDTH),
         "y": rng.normal(size=WIDTH),
         "into": rng.normal(size=WIDTH + BEHIND),
+        "angles": rng.normal(scale=10.0 ** rng.integers(-8, 9), size=WIDTH),
+        "cosine": rng.normal(size=WIDTH + BEHIND),
+        "sine": rng.normal(size=WIDTH + BEHIND),
     }
     return [numbers.get(one, arrays.get(one)) for one in ARGUMENTS[name]]
 
@@ -84,6 +88,42 @@ def test_what_is_not_padded_is_not_used_nor_written_behind_its_end(count):
     take(into, found, count)
     np.testing.assert_array_equal(found[:count], 2.0 * row)
     assert (found[count:] == -1.0).all()
+
+
+ANGLES = st.one_of(
+    st.floats(-1e9, 1e9),
+    st.floats(-10.0, 10.0),
+    st.integers(-1000, 1000).map(lambda k: 0.25 * k * np.pi),
+    st.sampled_from([0.0, -0.0, 5e-324, FAR, -FAR, np.nextafter(FAR, 2 * FAR), 1e300]),
+)
+
+
+@pytest.fixture(scope="module")
+def turn():
+    return call_of("turn")
+
+
+@given(st.lists(ANGLES, min_size=1, max_size=2 * LANES))
+@examples(200)
+def test_turns_are_those_of_libm_to_the_last_digit_but_one(turn, angles):
+    x = np.array(angles)
+    cosine, sine = np.full((2, 2 * LANES + BEHIND), -1.0)
+    turn(x, cosine, sine, x.size)
+    for found, expected in ((cosine, np.cos(x)), (sine, np.sin(x))):
+        np.testing.assert_allclose(found[: x.size], expected, rtol=0, atol=2.3e-16)
+        assert not found[x.size : whole(x.size)].any()
+        assert (found[whole(x.size) :] == -1.0).all()
+    small = np.abs(x) < 1e-8
+    np.testing.assert_array_equal(sine[: x.size][small], x[small])
+
+
+@pytest.mark.parametrize("angle", [np.nan, np.inf, -np.inf])
+def test_no_angle_has_no_turn(turn, angle):
+    x = np.array([0.5, angle, -0.5])
+    cosine, sine = np.zeros((2, LANES))
+    turn(x, cosine, sine, x.size)
+    np.testing.assert_array_equal(np.isnan(cosine), np.isnan(sine))
+    np.testing.assert_array_equal(np.flatnonzero(np.isnan(sine)), [1])
 
 
 @given(st.integers(0, 1000))

@@ -23,7 +23,7 @@ pytestmark = pytest.mark.filterwarnings("ignore:medley. (the motor of|what actua
 def assert_same(robot: Robot, seed: int, fast: float = 1.0) -> None:
     """Compare everything at a random state, with velocities up to some times ``fast``."""
     model = robot.rigid_model()  # type: ignore[attr-defined]
-    found = make_dynamics(model.bodies)
+    found = make_dynamics(model.bodies, robot.nq)
     q, v = random_state(robot, np.random.default_rng(seed))
     robot.update(q, fast * v)
     evaluate(model.bodies.handle(), np.array(robot.q), np.array(robot.v), found.handle())
@@ -93,7 +93,7 @@ def test_equal_on_every_feature(
 def test_a_quaternion_may_have_any_length(files: dict[str, Path]) -> None:
     robot = load_robot(files["medley"])
     model = robot.rigid_model()  # type: ignore[attr-defined]
-    one, other = make_dynamics(model.bodies), make_dynamics(model.bodies)
+    one, other = (make_dynamics(model.bodies, robot.nq) for _ in range(2))
     q, v = random_state(robot, np.random.default_rng(0))
     evaluate(model.bodies.handle(), q, v, one.handle())
     q[3:7] *= 7.0
@@ -105,7 +105,7 @@ def test_a_quaternion_may_have_any_length(files: dict[str, Path]) -> None:
 def test_a_second_state_owes_nothing_to_the_first() -> None:
     robot = loaded("puma560", "pinocchio")
     model = robot.rigid_model()  # type: ignore[attr-defined]
-    fresh, used = make_dynamics(model.bodies), make_dynamics(model.bodies)
+    fresh, used = (make_dynamics(model.bodies, robot.nq) for _ in range(2))
     rng = np.random.default_rng(0)
     for _ in range(3):
         evaluate(model.bodies.handle(), *random_state(robot, rng), used.handle())

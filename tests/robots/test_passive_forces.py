@@ -72,7 +72,7 @@ def test_the_bias_is_what_mujoco_needs(arm, backend):
     model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
     model.jnt_actgravcomp[:] = 0  # a motor's share is none that is asked of the controller
     data = mujoco.MjData(model)
-    dynamics = make_dynamics(robot.rigid_model().bodies)
+    dynamics = make_dynamics(robot.rigid_model().bodies, robot.nq)
     rng = np.random.default_rng(3)
     for _ in range(5):
         q, v = rng.uniform(-1, 1, (2, 3))

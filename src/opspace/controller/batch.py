@@ -20,7 +20,6 @@ from opspace.plan.pack_task import kind_of
 from opspace.plan.plan import Plan
 from opspace.plan.records import REMEMBERED, STATES
 from opspace.robots.adapter import AdapterBase
-from opspace.robots.bodies import make_dynamics
 from opspace.robots.motion_axes import MotionAxes
 from opspace.robots.rigid_model import RigidModel
 from opspace.stack import ContactMember, Member
@@ -151,7 +150,7 @@ class Batch:
 def axes_of(model: RigidModel, nq: int) -> MotionAxes:
     """Make memory of its own for a robot that compiled code computes, at rest."""
     n = model.bodies.before.size
-    return model.motion_axes(make_dynamics(model.bodies), np.zeros(nq), np.zeros(n))
+    return model.motion_axes(np.zeros(nq), np.zeros(n))
 
 
 def check_contacts(members: tuple[ContactMember, ...]) -> None:

@@ -59,7 +59,6 @@ from opspace.plan.quiet_call import QuietCall
 from opspace.plan.quiet_records import QUIET
 from opspace.plan.read_report import CompiledReport
 from opspace.robots.adapter import AdapterBase
-from opspace.robots.bodies import make_dynamics
 from opspace.robots.motion_axes import MotionAxes
 from opspace.robots.motor_range import motor_range
 from opspace.robots.rigid_model import RigidModel
@@ -387,7 +386,7 @@ class Controller(ReferenceController):
             axes = robot.motion_axes()
             apart = self._collisions is not None
             return None if apart and axes is not None and axes.followers else axes
-        return model.motion_axes(make_dynamics(model.bodies), *robot.state)
+        return model.motion_axes(*robot.state)
 
     def _not_compiled(self) -> str:
         """Name what somebody wrote that compiled code cannot call, empty where there is nothing."""

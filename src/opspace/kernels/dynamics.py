@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 
+from opspace.kernels.whole_vectors import turn
 from opspace.machine.jit import jit
 from opspace.robots.joint_kinds import ALIGNED, HINGE, SLIDE, TRANSLATION
 
@@ -34,12 +35,15 @@ def evaluate(bodies, q, v, dynamics):
     # Rows of arrays are passed on: a record of arrays would be copied at every call.
     for i in range(3):
         dynamics.acceleration[0, i] = -bodies.gravity[i]
+    turn(q, dynamics.cosine, dynamics.sine, q.shape[0])
     for i in range(1, bodies.kind.shape[0]):
         p, a, k = bodies.parent[i], bodies.first_v[i], bodies.first_q[i]
         x = dynamics.placement[i]
         _place(dynamics.placement[p], bodies.place[i], x)
         if bodies.kind[i] == ALIGNED:
-            _turn_aligned(x, bodies.along[i], q[k], dynamics.axes[a])
+            _turn_aligned(
+                x, bodies.along[i], dynamics.cosine[k], dynamics.sine[k], dynamics.axes[a]
+            )
             for c in range(6):
                 dynamics.step[i, c] = dynamics.axes[a, c] * v[a]
         else:
@@ -87,9 +91,8 @@ def _place(p, place, x):
 
 
 @jit
-def _turn_aligned(x, along, angle, s):
-    """R ← R Rot(e, angle) about one of its own axes, and the motion axis s (6,); angle in rad."""
-    c, sine = math.cos(angle), math.sin(angle)
+def _turn_aligned(x, along, c, sine, s):
+    """R ← R Rot(e, angle) about one of its own axes, and the motion axis s (6,)."""
     one, two = 3 * ((along + 1) % 3), 3 * ((along + 2) % 3)
     for row in range(3):
         u, w = x[one + row], x[two + row]

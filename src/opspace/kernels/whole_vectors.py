@@ -6,6 +6,8 @@ and ``begin`` come from `whole_before`, ``end`` and ``width`` from `whole`.
 
 from __future__ import annotations
 
+import math
+
 from numba import types
 
 from opspace.machine.array_vectors import (
@@ -31,6 +33,7 @@ from opspace.machine.array_vectors import (
 from opspace.machine.jit import jit
 from opspace.machine.lanes import whole as whole_of
 from opspace.machine.lanes import whole_before as whole_before_of
+from opspace.machine.sine_vectors import emit_turn
 
 whole = jit(whole_of)
 whole_before = jit(whole_before_of)
@@ -169,3 +172,16 @@ def clear_before(x, count):
     """Fill x with zeros before number ``count``, from where its vector begins."""
     for k in range(whole_before(count), count):
         x[k] = 0.0
+
+
+@in_vectors(emit_turn, types.void)
+def turn(angles, cosine, sine, count):
+    """Fill cosine and sine with those of so many angles, rad, zeros behind.
+
+    The angles themselves need not be padded.
+    """
+    clear_after(cosine, count, whole(count))
+    clear_after(sine, count, whole(count))
+    for k in range(count):
+        cosine[k] = math.cos(angles[k])
+        sine[k] = math.sin(angles[k])

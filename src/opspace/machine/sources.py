@@ -9,7 +9,7 @@ from pathlib import Path
 PACKAGE = Path(__file__).parents[1]
 COMPILERS = (
     *("jit.py", "handle_type.py", "array_elements.py", "array_vectors.py"),
-    *("translate.py", "compile_object.py"),
+    *("sine_vectors.py", "vector_code.py", "translate.py", "compile_object.py"),
 )
 IMPORTED = re.compile(
     r"^(?:from (opspace[.\w]*) import \(?([^)#]*?)\)?$|import (opspace[.\w]*))", re.M | re.S

@@ -51,6 +51,8 @@ DYNAMICS = RecordTable(
         "inertia", ("bodies", 10), "of each body, in the end of all that it carries", "kg, kg·m²"
     ),
     Field("step", ("bodies", 6), "motion of each body on its parent, S v", "m/s, rad/s"),
+    Field("cosine", ("whole nq",), "of each coordinate as an angle"),
+    Field("sine", ("whole nq",), "of each coordinate as an angle"),
 )
 
 
@@ -59,8 +61,8 @@ def no_bodies() -> Record:
     return RIGID_BODIES.make({"bodies": 0, "n": 0})
 
 
-def make_dynamics(bodies: Record) -> Record:
-    """Make the memory for the dynamics of a tree."""
-    dynamics = DYNAMICS.make({"n": bodies.before.size, "bodies": bodies.kind.size})
+def make_dynamics(bodies: Record, nq: int) -> Record:
+    """Make the memory for the dynamics of a tree, whose configuration has so many coordinates."""
+    dynamics = DYNAMICS.make({"n": bodies.before.size, "bodies": bodies.kind.size, "nq": nq})
     dynamics.placement[:1, [0, 4, 8]] = 1.0
     return dynamics

@@ -82,6 +82,6 @@ class MotionAxes:
     frames: Mapping[int, FramePlace]
     masses: Masses
     bodies: Record = field(default_factory=no_bodies)
-    dynamics: Record = field(default_factory=lambda: make_dynamics(no_bodies()))
-    later: Record = field(default_factory=lambda: make_dynamics(no_bodies()))
+    dynamics: Record = field(default_factory=lambda: make_dynamics(no_bodies(), 0))
+    later: Record = field(default_factory=lambda: make_dynamics(no_bodies(), 0))
     followers: bool = False

@@ -34,14 +34,14 @@ class RigidModel:
     frames: Mapping[int, FramePlace]
     masses: Masses
 
-    def motion_axes(self, dynamics: Record, q: np.ndarray, v: np.ndarray) -> MotionAxes:
+    def motion_axes(self, q: np.ndarray, v: np.ndarray) -> MotionAxes:
         """Return the arrays that compiled code reads of a robot that it computes itself.
 
         Args:
-            dynamics: Where it does, `DYNAMICS`.
-            q: (n,) the configuration that it reads.
+            q: (nq,) the configuration that it reads.
             v: (n,) the velocity.
         """
+        dynamics, later = (make_dynamics(self.bodies, q.size) for _ in range(2))
         return MotionAxes(
             q=q,
             v=v,
@@ -54,7 +54,7 @@ class RigidModel:
             masses=self.masses,
             bodies=self.bodies,
             dynamics=dynamics,
-            later=make_dynamics(self.bodies),
+            later=later,
         )
 
 
